@@ -1,0 +1,105 @@
+"""Outputs that are written whole or not at all."""
+
+import hashlib
+import os
+import tempfile
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from modrob_cli import __version__
+from modrob_cli.errors import OutputExistsError, UsageError
+
+
+def sha256(path: Path) -> str:
+    """Hex digest of a file's content."""
+    digest = hashlib.sha256()
+    with path.open("rb") as stream:
+        while block := stream.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def provenance(inputs: list[Path]) -> dict[str, object]:
+    """What an output was made from: the tool's version and the hash of each input file."""
+    return {"modrob": __version__, "inputs": {path.name: f"sha256:{sha256(path)}" for path in sorted(set(inputs))}}
+
+
+class OutputFolder:
+    """Collects files and puts them into a folder together when the ``with`` block ends well.
+
+    Files are written beside their place under temporary names, then renamed; after an error inside the block
+    nothing is left, not even a folder that was made for them.
+
+    Raises
+    ------
+    OutputExistsError
+        If a file is there already and ``overwrite`` is false; before anything is written.
+    UsageError
+        If the folder cannot be made or written, or two files get one name.
+    """
+
+    def __init__(self, folder: Path, overwrite: bool = False) -> None:
+        self.folder = folder
+        self.overwrite = overwrite
+        self._staged: dict[Path, Path] = {}
+        self._made: list[Path] = []
+
+    def __enter__(self) -> Self:
+        """Make the folder."""
+        missing = [path for path in (self.folder, *self.folder.parents) if not path.exists()]
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise UsageError(f"cannot make the output folder {self.folder}: {error.strerror}") from error
+        self._made = missing
+        return self
+
+    def claim(self, names: list[str]) -> None:
+        """Check before the work that these files may be written.
+
+        Raises
+        ------
+        OutputExistsError
+            Listing those that exist, unless overwriting is allowed.
+        """
+        there = [str(self.folder / name) for name in names if (self.folder / name).exists()]
+        if there and not self.overwrite:
+            raise OutputExistsError(f"{', '.join(there)}: exists already; pass --overwrite to replace it")
+
+    def stage(self, name: str) -> Path:
+        """Temporary path for a file; the caller writes it, the end of the block renames it."""
+        self.claim([name])
+        target = self.folder / name
+        if target in self._staged:
+            raise UsageError(f"two outputs of one name: {target}; choose another name or folder")
+        try:
+            handle, path = tempfile.mkstemp(prefix=".modrob-", suffix=target.suffix, dir=self.folder)
+        except OSError as error:
+            raise UsageError(f"cannot write into {self.folder}: {error.strerror}") from error
+        os.close(handle)
+        self._staged[target] = Path(path)
+        return Path(path)
+
+    def write(self, name: str, content: str | bytes) -> Path:
+        """Stage a file with this content; returns its final path."""
+        raw = content.encode() if isinstance(content, str) else content
+        self.stage(name).write_bytes(raw)
+        return self.folder / name
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Rename all files into place, or remove all of them."""
+        if kind is None:
+            umask = os.umask(0)
+            os.umask(umask)
+            for target, path in self._staged.items():
+                path.chmod(0o666 & ~umask)
+                path.replace(target)
+            return
+        for path in self._staged.values():
+            path.unlink(missing_ok=True)
+        for folder in self._made:
+            if folder.is_dir() and not any(folder.iterdir()):
+                folder.rmdir()

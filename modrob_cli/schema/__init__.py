@@ -1,0 +1,15 @@
+"""Documents as files hold them: pydantic models that mirror the YAML, each with ``to_model()``."""
+
+from modrob_cli.schema.assembly import AssemblyDocument
+from modrob_cli.schema.base import Document
+from modrob_cli.schema.module import ModuleDocument
+from modrob_cli.schema.robot import RobotDocument
+
+DOCUMENTS: dict[str, type[Document]] = {
+    "module/1": ModuleDocument,
+    "assembly/1": AssemblyDocument,
+    "robot/1": RobotDocument,
+}
+"""Document kinds by the value of their first key ``modrob``."""
+
+__all__ = ["DOCUMENTS", "AssemblyDocument", "Document", "ModuleDocument", "RobotDocument"]
