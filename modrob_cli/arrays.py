@@ -6,6 +6,7 @@ from numpy.typing import ArrayLike, NDArray
 from modrob_cli.errors import ShapeError
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 
 def frozen(value: ArrayLike, shape: tuple[int, ...]) -> Array:

@@ -1,0 +1,1 @@
+"""Modules and connections to robots; D-H tables, link parameters and their intervals as views of the result."""

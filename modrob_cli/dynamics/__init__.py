@@ -1,0 +1,1 @@
+"""Rigid-body algorithms, with Pinocchio behind one file."""

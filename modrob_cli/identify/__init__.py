@@ -1,0 +1,1 @@
+"""What a log says about an arm: signals, friction, prediction errors."""

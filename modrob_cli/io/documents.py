@@ -1,6 +1,7 @@
 """From YAML files to checked documents, with every fault at its place."""
 
 import difflib
+import functools
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,7 +10,8 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from modrob_cli.errors import Fault, InputFileError
-from modrob_cli.io.yaml_loader import Path_, YamlDocument, load_yaml
+from modrob_cli.io.yaml_builder import Path_, first_faults, shorten
+from modrob_cli.io.yaml_loader import YamlDocument, load_yaml
 from modrob_cli.schema import DOCUMENTS, Document
 
 D = TypeVar("D", bound=Document)
@@ -68,11 +70,11 @@ def _faults(error: ValidationError, loaded: YamlDocument, kind: type[Document]) 
     for item in error.errors(include_url=False):
         path = _known_path(item["loc"], loaded, missing=item["type"] == "missing")
         faults.append(loaded.fault(path, _message(dict(item), path, kind)))
-    return sorted(dict.fromkeys(faults), key=lambda fault: (fault.line or 0, fault.column or 0))
+    return first_faults(sorted(dict.fromkeys(faults), key=lambda fault: (fault.line or 0, fault.column or 0)))
 
 
 def _known_path(loc: Path_, loaded: YamlDocument, missing: bool) -> Path_:
-    """The part of pydantic's location that the file has (validators add steps of their own)."""
+    """Return the part of pydantic's location that the file has (validators add steps of their own)."""
     known = tuple(loc)
     while known and known not in loaded.marks:
         known = known[:-1]
@@ -83,8 +85,8 @@ def _message(item: dict[str, Any], path: Path_, kind: type[Document]) -> str:
     if item["type"] == "missing":
         return "required key is missing"
     if item["type"] == "extra_forbidden":
-        known = sorted(_known_keys(kind.model_json_schema(), path[:-1]))
-        close = difflib.get_close_matches(str(path[-1]), known, n=1)
+        known = _known_keys(kind, path[:-1])
+        close = difflib.get_close_matches(str(path[-1])[:_SHOWN], known, n=1)
         hint = f"did you mean {close[0]}?" if close else f"known keys: {', '.join(known)}"
         return f"unknown key {_describe(path[-1])}; {hint}"
     expected = re.sub(r"^(Input|String|List) should ", "expected it to ", item["msg"])
@@ -105,16 +107,22 @@ def _describe(value: Any) -> str:
         return "nothing"
     if hasattr(value, "nominal"):
         return _describe(value.nominal)
-    text = ascii(value) if isinstance(value, str) else str(value)
-    return text if len(text) <= _SHOWN else text[:_SHOWN] + "..."
+    return shorten(value, _SHOWN) if isinstance(value, str) else str(value)[:_SHOWN]
 
 
-def _known_keys(schema: dict[str, Any], path: Path_) -> set[str]:
-    """Keys that a JSON schema knows at a path."""
+@functools.lru_cache(maxsize=1000)
+def _known_keys(kind: type[Document], path: Path_) -> list[str]:
+    """Keys that a document kind knows at a path, sorted."""
+    schema = _json_schema(kind)
     nodes = list(_variants(schema, schema))
     for step in path:
         nodes = [inner for node in nodes for inner in _step(schema, node, step)]
-    return {key for node in nodes for key in node.get("properties", {})}
+    return sorted({key for node in nodes for key in node.get("properties", {})})
+
+
+@functools.cache
+def _json_schema(kind: type[Document]) -> dict[str, Any]:
+    return kind.model_json_schema()
 
 
 def _step(root: dict[str, Any], node: dict[str, Any], step: str | int) -> Iterator[dict[str, Any]]:
@@ -128,7 +136,7 @@ def _step(root: dict[str, Any], node: dict[str, Any], step: str | int) -> Iterat
 
 
 def _variants(root: dict[str, Any], node: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The schema itself or, behind references and alternatives, what it may be."""
+    """Yield the schema itself or, behind references and alternatives, what it may be."""
     if "$ref" in node:
         yield from _variants(root, root["$defs"][node["$ref"].rsplit("/", 1)[-1]])
     elif "anyOf" in node:

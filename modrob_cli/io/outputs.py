@@ -20,6 +20,11 @@ def sha256(path: Path) -> str:
     return digest.hexdigest()
 
 
+def text_sha256(text: str) -> str:
+    """Hex digest of a text as it is written, with the name of the algorithm."""
+    return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
+
+
 def provenance(inputs: list[Path]) -> dict[str, object]:
     """What an output was made from: the tool's version and the hash of each input file."""
     return {"modrob": __version__, "inputs": {path.name: f"sha256:{sha256(path)}" for path in sorted(set(inputs))}}

@@ -1,0 +1,1 @@
+"""Frozen dataclasses of arrays: bodies, joints, robots, modules, tables, logs."""

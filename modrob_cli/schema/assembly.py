@@ -43,7 +43,8 @@ def _lift_disturbance(value: Any) -> Any:
     return [value] if isinstance(value, int | float) else value
 
 
-def _to_interval(value: list[tuple[float, float]]) -> Interval:
+def disturbance_interval(value: list[list[float]]) -> Interval:
+    """Bounds of the disturbance: shape () for one entry, else one entry per joint."""
     ends = np.asarray(value, dtype=float)
     return Interval(ends[0, 0], ends[0, 1]) if len(value) == 1 else Interval(ends[:, 0], ends[:, 1])
 
@@ -51,7 +52,6 @@ def _to_interval(value: list[tuple[float, float]]) -> Interval:
 Disturbance = Annotated[
     list[Bounds],
     Field(min_length=1, description="unknown torque: one number d for [-d, d], or a list with one entry per joint"),
-    AfterValidator(_to_interval),
     BeforeValidator(_lift_disturbance, json_schema_input_type=float | list[Bounds]),
 ]
 
@@ -78,7 +78,7 @@ class AssemblyDocument(Document):
     modules: list[Use] = Field(min_length=1, description="base to tip")
     joint_names: Annotated[list[JointName] | None, AfterValidator(check_unique)] = None
     payload: BodySpec | None = Field(default=None, description="body at the end effector, in its output frame")
-    disturbance: Disturbance = Field(default_factory=lambda: Interval(0.0))
+    disturbance: Disturbance = [[0.0, 0.0]]
     limits: dict[JointName, LimitsSpec] = Field(default={}, description="limits that replace those of a joint")
 
     def to_model(self, modules: list[Module]) -> Assembly:
@@ -94,6 +94,6 @@ class AssemblyDocument(Document):
             gravity=np.asarray(self.gravity),
             payload=self.payload.to_model("payload") if self.payload else None,
             joint_names=tuple(self.joint_names) if self.joint_names else None,
-            disturbance=self.disturbance,
+            disturbance=disturbance_interval(self.disturbance),
             limit_overrides=tuple(LimitOverride(joint, spec.to_model()) for joint, spec in self.limits.items()),
         )

@@ -118,4 +118,3 @@ class ModuleDocument(Document):
         body = (self.body or MASSLESS).to_model(self.name)
         outputs = {key: RigidPart(spec.to_model(), body) for key, spec in (self.connections or {}).items()}
         return Module(self.name, self.kind, self.source, outputs=outputs)
-

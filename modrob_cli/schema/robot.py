@@ -11,7 +11,7 @@ from modrob_cli.interval import Interval
 from modrob_cli.model.body import PlacedBody
 from modrob_cli.model.joint import Joint
 from modrob_cli.model.robot import STANDARD_GRAVITY, Robot
-from modrob_cli.schema.assembly import Disturbance
+from modrob_cli.schema.assembly import Disturbance, disturbance_interval
 from modrob_cli.schema.base import Angle, Document, JointName, Name, Point, PoseSpec
 from modrob_cli.schema.body import BodySpec
 from modrob_cli.schema.joint import DriveSpec
@@ -85,12 +85,12 @@ class RobotDocument(Document):
     bodies: list[RobotBodySpec] = []
     tool_transform: PoseSpec = Field(default=PoseSpec(), description="end effector in the frame of the last link")
     payload: BodySpec | None = Field(default=None, description="body at the end effector, in the tool frame")
-    disturbance: Disturbance = Field(default_factory=lambda: Interval(0.0))
+    disturbance: Disturbance = [[0.0, 0.0]]
 
     @model_validator(mode="after")
     def _counts(self) -> Self:
         n = len(self.joints)
-        if self.disturbance.shape not in ((), (n,)):
+        if len(self.disturbance) not in (1, n):
             message = "Input should have one disturbance, or one for each of {n} joints"
             raise PydanticCustomError("count", message, {"n": n})
         worst = max((body.link for body in self.bodies), default=0)
@@ -111,7 +111,7 @@ class RobotDocument(Document):
         tool = in_link[-1] @ self.tool_transform.to_model()
         if self.payload is not None:
             bodies.append(PlacedBody(len(joints), tool, self.payload.to_model("payload")))
-        disturbance = Interval(np.zeros(len(joints))) + self.disturbance
+        disturbance = Interval(np.zeros(len(joints))) + disturbance_interval(self.disturbance)
         return Robot(self.name, joints, tuple(bodies), tool, np.asarray(self.gravity), disturbance)
 
     def _joint(self, k: int, before: Array) -> Joint:

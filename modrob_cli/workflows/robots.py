@@ -1,0 +1,48 @@
+"""ROBOT on the command line: an assembly, a robot file or a URDF."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from modrob_cli.assembly.synthesis import synthesize
+from modrob_cli.errors import Fault, InputFileError
+from modrob_cli.io.catalogue import Catalogue, read_assembly
+from modrob_cli.io.documents import check_document, kind_of
+from modrob_cli.io.yaml_loader import load_yaml
+from modrob_cli.model.robot import Robot
+from modrob_cli.schema import RobotDocument
+
+URDF_SUFFIXES = (".urdf", ".xml")
+
+
+@dataclass(frozen=True)
+class LoadedRobot:
+    """A robot and the files it was read from."""
+
+    robot: Robot
+    files: list[Path]
+
+
+def load_robot(path: Path, catalogue: Catalogue | None = None) -> LoadedRobot:
+    """Read a robot from an ``assembly/1``, a ``robot/1`` or a URDF file.
+
+    Raises
+    ------
+    InputFileError
+        If the file, or one that it refers to, cannot be used.
+    """
+    if path.suffix.lower() in URDF_SUFFIXES:
+        from modrob_cli.io.urdf_reader import read_urdf
+
+        return LoadedRobot(read_urdf(path), [path])
+    loaded = load_yaml(path)
+    kind = kind_of(loaded)
+    if kind == "assembly/1":
+        found = read_assembly(path, catalogue)
+        return LoadedRobot(synthesize(found.assembly), found.files)
+    if kind == "module/1":
+        message = "found a module/1 document, expected a robot: an assembly/1, a robot/1 or a URDF file"
+        raise InputFileError(loaded.fault(("modrob",), message))
+    document = check_document(loaded, RobotDocument)
+    if not isinstance(document, RobotDocument):
+        raise InputFileError(Fault(str(path), "expected a robot"))
+    return LoadedRobot(document.to_model(), [path])
