@@ -44,7 +44,12 @@ class Fault:
         place = self.file
         if self.line is not None:
             place += f":{self.line}" + (f":{self.column}" if self.column is not None else "")
-        return ": ".join(part for part in (place, self.path, self.message) if part)
+        return printable(": ".join(part for part in (place, self.path, self.message) if part))
+
+
+def printable(text: str) -> str:
+    """Escape what is not printable (control characters, lone surrogates), so that no input reaches a terminal raw."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 class InputFileError(ModrobError):

@@ -1,6 +1,6 @@
 """MCAP files for tests, written by the mcap package's own ROS 2 writer."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +19,9 @@ string frame_id
 def joint_state(
     stamp: float,
     names: Sequence[str],
-    position: Sequence[float],
-    velocity: Sequence[float] = (),
-    effort: Sequence[float] = (),
+    position: Iterable[float],
+    velocity: Iterable[float] = (),
+    effort: Iterable[float] = (),
     frame: str = "",
 ) -> dict[str, Any]:
     """One message; the stamp is in seconds."""
@@ -52,5 +52,5 @@ def write_mcap(
         for topic, messages in topics.items():
             for index, message in enumerate(messages):
                 writer.write_message(topic, schema, message, log_time=index, publish_time=index)
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
     return path

@@ -83,7 +83,7 @@ def random_chain(rng: np.random.Generator, most_joints: int = 12) -> tuple[Assem
     while joints > 0:
         for _ in range(int(rng.integers(0, 3))):
             uses.append(_link(rng, raw, f"L{len(uses)}"))
-        count = int(min(joints, rng.integers(1, 3)))
+        count = min(joints, int(rng.integers(1, 3)))
         units = tuple(_unit(rng, raw, f"J{len(uses)}.{k}") for k in range(count))
         uses.append(ModuleUse(Module(f"J{len(uses)}", "joint", units=units)))
         joints -= count

@@ -56,10 +56,10 @@ def decompose(T: Array) -> CommonNormal:
     * skew or intersecting axes: x along the common normal V = R'^T (z' x e) (rule iii).
 
     The sense of the common normal in the third case is free. It is chosen so that \|phi_i\| <= pi/2: V_x > 0, or
-    V_x = 0 (to 1e-9 of \|V\|) and V_y > 0. Taking the cross product as it stands would give sin(alpha) <= 0 always and so
-    contradict the published table (alpha_4 = +pi/2 in [D] Table 3.4); the element-wise absolute value that the public
-    MATLAB code takes is no common normal at all for most orientations. This rule reproduces the published table and
-    holds for every orientation.
+    V_x = 0 (to 1e-9 of \|V\|) and V_y > 0. Taking the cross product as it stands would give sin(alpha) <= 0 always
+    and so contradict the published table (alpha_4 = +pi/2 in [D] Table 3.4); the element-wise absolute value that the
+    public MATLAB code takes is no common normal at all for most orientations. This rule reproduces the published
+    table and holds for every orientation.
 
     Parameters
     ----------

@@ -3,9 +3,10 @@
 For each of the six entries and both ends: boxes are shrunk to an end point of a variable where the gradient keeps its
 sign, bounded by the mean-value form, dropped where they cannot reach the best value found (up to ``TOLERANCE``), and
 divided otherwise: into the two end points of a variable along which the function is convex (its maximum is there), or
-into two halves. Where the function is concave in all free variables at once, one climb and its tangent settle the box. The result always encloses the exact range; it exceeds it by at most ``TOLERANCE`` times the
-magnitude of the terms, or, where ``MAX_BOXES`` boxes did not suffice (many free directions at an interior optimum),
-by the gap that is left then.
+into two halves. Where the function is concave in all free variables at once, one climb and its tangent settle the box.
+
+The result always encloses the exact range; it exceeds it by at most ``TOLERANCE`` times the magnitude of the terms, or,
+where ``MAX_BOXES`` boxes did not suffice (many free directions at an interior optimum), by the gap that is left then.
 
 Rounding: values and bounds are computed in round-to-nearest. A value is a sum over bodies of products of at most
 three rounded factors; with u = 2^-53 it is off by less than 30 u S, where S (``_magnitude``) is at least four times the

@@ -1,8 +1,9 @@
 """Interval parameters of links as the dissertation publishes them. [D] 3.4.3.
 
-Equations (2.17)-(2.24) evaluated with interval operations, division by [m] included. The result encloses the true
-set, but mass and centre of mass enter several times, so it is far wider than the tight ranges of
-:mod:`modrob_cli.assembly.interval_tight`. It is kept for comparison with published figures.
+Equations (2.17)-(2.24) evaluated with interval operations, division by [m] included, from connector to connector in
+the order of the modules; massless parts take part in it as any other, except where the division would be 0 / 0. The
+result encloses the true set, but mass and centre of mass enter several times, so it is far wider than the tight ranges
+of :mod:`modrob_cli.assembly.interval_tight`. It is kept for comparison with published figures.
 
 Rounding: interval operations round outward; the transforms between connector frames are doubles, off by a few units
 in the last place, for which every result is widened by ``ROUNDING`` times the magnitude of its terms.
@@ -21,7 +22,7 @@ from modrob_cli.spatial import invert
 
 ROUNDING = 2e-14
 """Relative allowance for rounding outside interval operations, 180 units of 2^-53. A product of rotations and
-translations adds at most 6 units per factor to an entry; a link of ten modules has some 20 factors that are not exact."""
+translations adds at most 6 units per factor to an entry; a link of ten modules has some 20 factors that round."""
 
 
 @dataclass(frozen=True)

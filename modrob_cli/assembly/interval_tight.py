@@ -25,6 +25,7 @@ def tight_intervals(robot: Robot, frames: Array) -> LinkIntervals:
 
 
 def _link(bodies: list[PlacedBody]) -> tuple[Interval, Interval, Interval]:
+    bodies = [placed for placed in bodies if not placed.body.is_massless]
     if not bodies:
         return Interval(0.0), Interval(np.zeros(3)), Interval(np.zeros(6))
     mass = Interval(0.0)

@@ -125,9 +125,9 @@ class LinkBox:
         For diagonal entries and fixed masses, f is a weighted variance, convex in the c_b outside F, and a linear
         function minus a square in those of F.
         """
-        free_mass, free_com = self._split(low < high)
+        free_mass, free_com = self._split(high - low)
         blocked = np.where(sign[:, None] < 0.0, self.about_frame, 1.0 - self.about_frame)[:, :, None]
-        return (_K[entry] == _L[entry]) & ~free_mass.any(axis=1) & ~(free_com * blocked).any(axis=(1, 2))
+        return np.asarray((_K[entry] == _L[entry]) & ~free_mass.any(axis=1) & ~(free_com * blocked).any(axis=(1, 2)))
 
     def _levers(self, m_low: Array, m_high: Array, turned: Ends) -> Ends:
         """Bounds of r_b - centre = sum_j w_j (r_b - r_j), w_j = m_j / total, shape (K, B, 3) each.

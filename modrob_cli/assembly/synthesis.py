@@ -23,9 +23,8 @@ class _Chain:
     bodies: list[PlacedBody]
 
     def carry(self, body: RigidBody) -> None:
-        """Fix a body to the last link, its frame at the last connector; massless parts leave no trace."""
-        if not body.is_massless:
-            self.bodies.append(PlacedBody(len(self.joints), self.pose, body))
+        """Fix a body to the last link, its frame at the last connector."""
+        self.bodies.append(PlacedBody(len(self.joints), self.pose, body))
 
     def pass_part(self, part: RigidPart) -> None:
         """Go from the input to the output frame of a rigid part."""

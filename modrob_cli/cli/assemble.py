@@ -43,13 +43,14 @@ def assemble(
     for robot in robots if len(robots) <= _FULL_REPORTS else []:
         show_robot(robot)
     if len(robots) > _FULL_REPORTS:
-        say(table(("robot", "joints", "mass [kg]"), [_summary(robot) for robot in robots]))
+        say(summary_table(robots))
     say(f"\n{len(robots)} robot{'s' if len(robots) > 1 else ''} written to {out}/")
 
 
-def _summary(robot: "AssembledRobot") -> tuple[str, int, float]:
-    tables = robot.tables
-    return tables.robot.name, tables.robot.dof, float(tables.links.mass.sum())
+def summary_table(robots: list["AssembledRobot"]) -> str:
+    """One line per robot."""
+    rows = [(r.tables.robot.name, r.tables.robot.dof, float(r.tables.links.mass.sum())) for r in robots]
+    return table(("robot", "joints", "moving mass [kg]"), rows)
 
 
 def show_robot(robot: "AssembledRobot") -> None:

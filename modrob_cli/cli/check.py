@@ -17,7 +17,8 @@ Paths = Annotated[list[Path], typer.Argument(metavar="PATH...", help="Documents,
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command("check")(check)
+    example = "Example: modrob check modules assemblies --strict"
+    app.command("check", epilog=example, no_args_is_help=True)(check)
 
 
 def check(paths: Paths, strict: Strict = False, as_json: AsJson = False) -> None:
@@ -41,10 +42,15 @@ def _report(result: "CheckResult") -> None:
         say(f"error: {fault}")
     for warned in result.warnings:
         say(f"warning: {warned.fault}")
+    say(summary_line(result))
+
+
+def summary_line(result: "CheckResult") -> str:
+    """Counts of documents, faults and warnings."""
     documents = f"{len(result.files)} document{'s' * (len(result.files) != 1)} checked"
     faults, warnings = len(result.faults), len(result.warnings)
     parts = [f"{faults} fault{'s' * (faults != 1)}"] * bool(faults)
-    say(", ".join([documents, *parts, f"{warnings} warning{'s' * (warnings != 1)}"]))
+    return ", ".join([documents, *parts, f"{warnings} warning{'s' * (warnings != 1)}"])
 
 
 def _as_json(result: "CheckResult", strict: bool) -> dict[str, Any]:

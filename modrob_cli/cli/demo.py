@@ -1,7 +1,58 @@
-"""Placeholder."""
+"""``modrob demo``."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
+
+from modrob_cli.cli.assemble import show_robot, summary_table
+from modrob_cli.cli.check import summary_line
+from modrob_cli.cli.console import say, table
+from modrob_cli.cli.options import OutDir, Overwrite
+
+if TYPE_CHECKING:
+    from modrob_cli.workflows.assemble import AssembledRobot
+    from modrob_cli.workflows.demo import DemoResult
+
+_DEFAULT = Path("out/demo")
+
+
+def demo(out: OutDir = _DEFAULT, overwrite: Overwrite = False) -> None:
+    """Run the whole chain on the shipped example: check, assemble, draw."""
+    from modrob_cli.workflows import demo as workflow
+
+    result = workflow.demo(out, overwrite, announce=lambda step: say(f"\n{step}"))
+    _report(result, workflow.MAIN_ROBOT, workflow.UNCERTAIN_ROBOT)
+
+
+def _report(result: "DemoResult", main: str, uncertain: str) -> None:
+    say(f"\nThe catalogue: {summary_line(result.checked)}")
+    for warned in result.checked.warnings:
+        say(f"  {Path(warned.fault.file).name}: {warned.fault.path}: {warned.fault.message}")
+    say("\nThe arms:")
+    say(summary_table(result.robots))
+    say("\nThe 6-axis arm of the dissertation's Table 3.4:")
+    show_robot(result.robot(main))
+    say(f"\nThe same arm with 5 % on every module ({uncertain}): how wide its link parameters are, and how much wider")
+    say("the published interval synthesis makes them (1 = as tight as can be):\n")
+    say(_widening(result.robot(uncertain)))
+    say(f"\nEverything is in {result.folder}/; {result.folder}/README.md says what each file is.")
+    say(f"Look at {result.folder}/pose/{main}.png first.")
+
+
+def _widening(robot: "AssembledRobot") -> str:
+    """Table of tight widths and the factor of the published form, per link."""
+    tables = robot.tables
+    rows = []
+    for i, joint in enumerate(tables.robot.joints):
+        row: list[object] = [joint.name]
+        for tight, published in tables.widths(i):
+            row.append("exact" if tight == 0.0 else f"{tight:.3g} (x {published / tight:.2f})")
+        rows.append(row)
+    header = ("joint", "mass [kg]", "com, widest [m]", "inertia, widest [kg m^2]")
+    return table(header, rows)
 
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
+    app.command("demo", epilog="Example: modrob demo -o out/demo")(demo)

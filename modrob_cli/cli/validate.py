@@ -125,5 +125,8 @@ def _say_end(result: dict[str, Any]) -> None:
     say(result["scope"])
     if result["passed"] is not None:
         say(f"Verdict: {'passed' if result['passed'] else 'failed'}")
-    for path in result["files"].values():
+    files = list(result["files"].values())
+    for path in files[:6]:
         say(f"wrote {path}")
+    if len(files) > 6:
+        say(f"and {len(files) - 6} more files beside them")

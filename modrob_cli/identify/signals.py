@@ -18,6 +18,9 @@ DEFAULT_CUTOFF = 10.0
 ORDER = 4
 """Order of the Butterworth filter; run forward and backward it falls off as one of twice the order."""
 
+MARGIN = 2.0
+"""Periods of the cut-off frequency after which an end of the recording matters by less than 0.5 % (accelerations)."""
+
 JITTER = 0.01
 """Steps that differ from the median step by more than this share make resampling necessary."""
 
@@ -34,7 +37,7 @@ class Signals:
     t : times, shape (N,), [s]
     q, dq, ddq : low-passed positions and their derivatives, shape (N, n), [rad] or [m]
     effort : as recorded (interpolated where resampled), not filtered, shape (N, n)
-    used : False within one period of the cut-off frequency of either end and of gaps, shape (N,)
+    used : False within two periods of the cut-off frequency from either end and from gaps, shape (N,)
     moving : joints whose motion stands out from the noise, shape (n,)
     band : half-width of the band around standstill in which the sign of dq is uncertain, shape (n,), [rad/s] or [m/s]
     rate, cutoff : sampling and cut-off frequency, [Hz]
@@ -85,8 +88,8 @@ def prepare(log: JointLog, cutoff: float | None = None) -> Signals:
     used = _used(t, log.t, step, cutoff)
     if np.count_nonzero(used) < 50:
         raise NumericalError(
-            f"{log.name} lasts {t[-1]:.3g} s with {len(log.t)} samples; once {1.0 / cutoff:.2g} s are cut at each end "
-            "and around gaps, fewer than 50 samples are left; use a longer log or a higher --cutoff"
+            f"{log.name} lasts {t[-1]:.3g} s with {len(log.t)} samples; without {MARGIN / cutoff:.2g} s at each end "
+            "and around gaps fewer than 50 samples are left; use a longer log or a higher --cutoff"
         )
     q_low = low_pass(q, 1.0 / step, cutoff)
     if dq is None:
@@ -130,7 +133,7 @@ def _resample(log: JointLog, step: float) -> tuple[Array, Array, Array | None, A
 
 def _used(t: Array, recorded: Array, step: float, cutoff: float) -> Mask:
     """Mark the samples that no end of the recording and no gap in it can have reached through the filter."""
-    margin = 1.0 / cutoff
+    margin = MARGIN / cutoff
     used = np.asarray((t >= t[0] + margin) & (t <= t[-1] - margin))
     gaps = np.flatnonzero(np.diff(recorded) > max(0.25 / cutoff, 1.5 * step))
     for start, end in zip(recorded[gaps], recorded[gaps + 1], strict=True):

@@ -6,9 +6,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from modrob_cli.arrays import Array
 from modrob_cli.errors import NumericalError, ShapeError
 from modrob_cli.interval import rounding
-from modrob_cli.arrays import Array
 
 Pairwise = Callable[[Array, Array], tuple[Array, Array]]
 
@@ -21,15 +21,15 @@ class Interval:
 
     Parameters
     ----------
-    inf, sup : array_like of one shape (or broadcastable), inf <= sup, no NaN; infinite end points are allowed.
-        With ``sup`` left out the intervals are degenerate (points).
+    inf, sup : array_like of one shape (or broadcastable), inf <= sup, no NaN; infinite end points are allowed, but
+        an interval of nothing but infinity is not. With ``sup`` left out the intervals are degenerate (points).
 
     Raises
     ------
     ShapeError
         If the two shapes do not broadcast.
     NumericalError
-        If an end point is NaN, or inf > sup somewhere.
+        If an end point is NaN, or inf > sup, or an interval holds no real number, somewhere.
     """
 
     __slots__ = ("inf", "sup")
@@ -45,8 +45,8 @@ class Interval:
             lower, upper = np.broadcast_arrays(lower, upper)
         except ValueError as error:
             raise ShapeError(f"interval end points of shapes {lower.shape} and {upper.shape}") from error
-        if not np.all(lower <= upper):  # also false for NaN
-            raise NumericalError("an interval needs inf <= sup and no NaN")
+        if not np.all((lower <= upper) & (lower < np.inf) & (upper > -np.inf)):  # also false for NaN
+            raise NumericalError("an interval needs inf <= sup, no NaN, and a real number in it")
         lower, upper = lower.copy(), upper.copy()
         lower.setflags(write=False)
         upper.setflags(write=False)
@@ -56,6 +56,14 @@ class Interval:
     def __setattr__(self, name: str, value: object) -> None:
         """Refuse: intervals are immutable."""
         raise AttributeError(f"Interval is immutable: {name}")
+
+    def __delattr__(self, name: str) -> None:
+        """Refuse: intervals are immutable."""
+        raise AttributeError(f"Interval is immutable: {name}")
+
+    def __reduce__(self) -> tuple[type["Interval"], tuple[Array, Array]]:
+        """Copy and pickle through the constructor."""
+        return Interval, (self.inf, self.sup)
 
     @classmethod
     def of(cls, value: "Interval | ArrayLike") -> "Interval":
@@ -69,10 +77,12 @@ class Interval:
 
     @property
     def mid(self) -> Array:
-        """Midpoint, rounded to nearest; always a member of the interval (0 for the whole line)."""
-        with np.errstate(invalid="ignore"):
+        """Midpoint, rounded to nearest; always a finite member (0 for the whole line, the largest double of a ray)."""
+        largest = np.finfo(float).max
+        with np.errstate(invalid="ignore", under="ignore"):
             middle = 0.5 * self.inf + 0.5 * self.sup
-        return np.clip(np.where(np.isnan(middle), 0.0, middle), self.inf, self.sup)
+        middle = np.clip(np.where(np.isnan(middle), 0.0, middle), -largest, largest)
+        return np.clip(middle, self.inf, self.sup)
 
     @property
     def rad(self) -> Array:

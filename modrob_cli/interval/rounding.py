@@ -13,11 +13,21 @@ import numpy as np
 from modrob_cli.arrays import Array
 
 
+def _below(value: Array) -> Array:
+    """Return the next double downward; NumPy warns of a step to infinity, which is meant here."""
+    with np.errstate(over="ignore", under="ignore"):
+        return np.asarray(np.nextafter(value, -np.inf))
+
+
+def _above(value: Array) -> Array:
+    """Return the next double upward, as above."""
+    with np.errstate(over="ignore", under="ignore"):
+        return np.asarray(np.nextafter(value, np.inf))
+
+
 def _outward(value: Array, exact: Array) -> tuple[Array, Array]:
     """One step outward on both sides, except where the value is exact."""
-    down = np.where(exact, value, np.nextafter(value, -np.inf))
-    up = np.where(exact, value, np.nextafter(value, np.inf))
-    return down, up
+    return np.where(exact, value, _below(value)), np.where(exact, value, _above(value))
 
 
 def add(a: Array, b: Array) -> tuple[Array, Array]:
@@ -28,8 +38,8 @@ def add(a: Array, b: Array) -> tuple[Array, Array]:
         error = (a - (s - t)) + (b - t)
     known = np.isfinite(error) & np.isfinite(s)
     infinite_exact = np.isinf(a) | np.isinf(b)
-    down = np.where((known & (error >= 0)) | infinite_exact, s, np.nextafter(s, -np.inf))
-    up = np.where((known & (error <= 0)) | infinite_exact, s, np.nextafter(s, np.inf))
+    down = np.where((known & (error >= 0)) | infinite_exact, s, _below(s))
+    up = np.where((known & (error <= 0)) | infinite_exact, s, _above(s))
     return down, up
 
 

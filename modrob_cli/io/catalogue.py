@@ -7,7 +7,7 @@ from pathlib import Path
 
 from modrob_cli.errors import Fault, InputFileError
 from modrob_cli.io.documents import check_document, kind_of, read_document
-from modrob_cli.io.yaml_loader import YamlDocument, load_yaml
+from modrob_cli.io.yaml_loader import YamlDocument, is_folder, is_same_file, load_yaml
 from modrob_cli.model.module import Assembly, Module
 from modrob_cli.schema import AssemblyDocument, ModuleDocument
 
@@ -139,15 +139,15 @@ def _collect(
 
 def _entry_files(target: Path, assembly: Path, catalogue: Catalogue) -> list[tuple[Path, bool]]:
     """Files of one catalogue entry, each with whether it has to be a module."""
-    if not target.is_dir():
-        if target.resolve() == assembly.resolve():
+    if not is_folder(target):
+        if is_same_file(target, assembly):
             message = "is the assembly itself (a cycle of file references); name a folder or files of modules"
             raise InputFileError(Fault(str(target), message))
         return [(target, True)]
     files = catalogue.files(target)
     if not files:
         raise InputFileError(Fault(str(target), "found no YAML file in this folder, expected module/1 documents"))
-    return [(file, False) for file in files if file.resolve() != assembly.resolve()]
+    return [(file, False) for file in files if not is_same_file(file, assembly)]
 
 
 def _chain_faults(

@@ -75,10 +75,13 @@ def _faults(error: ValidationError, loaded: YamlDocument, kind: type[Document]) 
 
 def _known_path(loc: Path_, loaded: YamlDocument, missing: bool) -> Path_:
     """Return the part of pydantic's location that the file has (validators add steps of their own)."""
-    known = tuple(loc)
-    while known and known not in loaded.marks:
-        known = known[:-1]
-    return (*known, loc[-1]) if missing else known
+    node = loaded.data
+    for k, step in enumerate(loc):
+        inside = step in node if isinstance(node, dict) else isinstance(node, list) and step in range(len(node))
+        if not inside:
+            return (*loc[:k], loc[-1]) if missing else loc[:k]
+        node = node[step]
+    return loc
 
 
 def _message(item: dict[str, Any], path: Path_, kind: type[Document]) -> str:

@@ -134,20 +134,26 @@ def _damaged(path: Path, reason: str) -> InputFileError:
 
 
 def _stream_records(stream: BinaryIO, size: int) -> Iterator[Any]:
-    from mcap.records import Channel, Chunk, Message, Schema
+    from mcap.records import Channel, Chunk, DataEnd, Message, Schema, Statistics
     from mcap.stream_reader import StreamReader, breakup_chunk
 
     # No record can be longer than the file: a damaged length must not ask for gigabytes.
     reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=size)
-    in_data = True
+    in_data, count = True, 0
     for record in reader.records:
         if isinstance(record, Chunk):
             if record.uncompressed_size > MAX_CHUNK:
                 raise ValueError(f"a chunk claims {record.uncompressed_size} bytes")
-            yield from breakup_chunk(record, validate_crc=True)
-        elif type(record).__name__ == "DataEnd":
+            inside = breakup_chunk(record, validate_crc=True)
+            count += sum(isinstance(item, Message) for item in inside)
+            yield from inside
+        elif isinstance(record, DataEnd):
             in_data = False
+        elif isinstance(record, Statistics) and record.message_count != count:
+            # A damaged record may be skipped like one of an unknown kind; the count of the summary tells.
+            raise ValueError(f"found {count} messages, its summary says {record.message_count}")
         elif in_data and isinstance(record, Schema | Channel | Message):
+            count += isinstance(record, Message)
             yield record
 
 
@@ -199,8 +205,8 @@ class _Assembler:
     def _raise_missing(self, found: set[str]) -> NoReturn:
         missing = ", ".join(name for name in self.wanted if name not in found)
         raise self._error(
-            f"joints not in the log: {missing}; the robot has {', '.join(self.wanted)}; the log has "
-            f"{', '.join(sorted(found)) or 'none'}; give the robot the log's names (joint_names: in an assembly)"
+            f"joints of the robot are not in the log: {missing}; the robot has {', '.join(self.wanted)}; the log has "
+            f"{', '.join(sorted(found)) or 'none'}; give both the same names (joint_names: in an assembly renames them)"
         )
 
     def _values(self, field: str, messages: list[JointState]) -> tuple[Array | None, str]:

@@ -55,7 +55,7 @@ def encode_plain(module: StoredModule, file: str) -> bytes:
         records = [(LINK_LAYOUT, {**_link_values(data), **body}) for data in module.outputs.values()]
     values = [values.get(key, 0.0) for layout, values in records for key in layout]
     with np.errstate(over="ignore"):
-        packed = np.array(values, dtype="<f4")
+        packed = np.array(values, dtype="<f4") + np.float32(0.0)  # no negative zeros
     if not np.all(np.isfinite(packed)):
         worst = values[int(np.argmin(np.isfinite(packed)))]
         raise InputFileError(Fault(file, f"found {worst:.6g}, expected numbers up to 3.4e38 (single precision)"))

@@ -35,8 +35,3 @@ class StoredModule:
     outputs: dict[str, ConnectionData] = field(default_factory=dict)
     body: RigidBody | None = None
     units: tuple[StoredUnit, ...] = ()
-
-    def bodies(self) -> list[RigidBody]:
-        """All bodies, base to tip."""
-        pairs = [body for unit in self.units for body in (unit.proximal_body, unit.distal_body)]
-        return pairs if self.body is None else [self.body]

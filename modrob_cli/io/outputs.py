@@ -3,6 +3,7 @@
 import hashlib
 import os
 import tempfile
+from collections import Counter
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -26,8 +27,14 @@ def text_sha256(text: str) -> str:
 
 
 def provenance(inputs: list[Path]) -> dict[str, object]:
-    """What an output was made from: the tool's version and the hash of each input file."""
-    return {"modrob": __version__, "inputs": {path.name: f"sha256:{sha256(path)}" for path in sorted(set(inputs))}}
+    """What an output was made from: the tool's version and the hash of each input file.
+
+    Inputs go by file name, or by the path as given where two share a name.
+    """
+    paths = sorted(set(inputs))
+    names = Counter(path.name for path in paths)
+    hashes = {path.name if names[path.name] == 1 else str(path): f"sha256:{sha256(path)}" for path in paths}
+    return {"modrob": __version__, "inputs": hashes}
 
 
 class OutputFolder:
@@ -52,8 +59,8 @@ class OutputFolder:
 
     def __enter__(self) -> Self:
         """Make the folder."""
-        missing = [path for path in (self.folder, *self.folder.parents) if not path.exists()]
         try:
+            missing = [path for path in (self.folder, *self.folder.parents) if not path.exists()]
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise UsageError(f"cannot make the output folder {self.folder}: {error.strerror}") from error
@@ -67,7 +74,14 @@ class OutputFolder:
         ------
         OutputExistsError
             Listing those that exist, unless overwriting is allowed.
+        UsageError
+            If a folder is in the place of one.
         """
+        folders = [str(self.folder / name) for name in names if (self.folder / name).is_dir()]
+        if folders:
+            raise UsageError(
+                f"{', '.join(folders)}: found a folder where a file is to be written; choose another folder"
+            )
         there = [str(self.folder / name) for name in names if (self.folder / name).exists()]
         if there and not self.overwrite:
             raise OutputExistsError(f"{', '.join(there)}: exists already; pass --overwrite to replace it")
@@ -89,7 +103,11 @@ class OutputFolder:
     def write(self, name: str, content: str | bytes) -> Path:
         """Stage a file with this content; returns its final path."""
         raw = content.encode() if isinstance(content, str) else content
-        self.stage(name).write_bytes(raw)
+        path = self.stage(name)
+        try:
+            path.write_bytes(raw)
+        except OSError as error:
+            raise UsageError(f"cannot write {self.folder / name}: {error.strerror}") from error
         return self.folder / name
 
     def __exit__(

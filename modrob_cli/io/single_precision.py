@@ -49,15 +49,15 @@ def outward_triple(nominal: float, interval: Interval) -> Triple:
     any other exact value gets bounds around it.
     """
     low, high = float(interval.inf), float(interval.sup)
-    centre = np.float32(nominal)
+    centre = float(np.float32(nominal)) + 0.0  # no negative zeros
     if low == high and shortest_decimal(centre) == nominal:
-        return (float(centre),) * 3
+        return centre, centre, centre
     down, up = np.float32(low), np.float32(high)
     if float(down) > low or low == high == float(down):
         down = np.nextafter(down, np.float32(-np.inf))
     if float(up) < high or low == high == float(up):
         up = np.nextafter(up, np.float32(np.inf))
-    return float(centre), float(down), float(up)
+    return centre, float(down) + 0.0, float(up) + 0.0
 
 
 def read_triple(nominal: float, low: float, high: float) -> tuple[float, float, float]:

@@ -13,7 +13,7 @@ from modrob_cli.errors import Fault, InputFileError
 from modrob_cli.io.yaml_scalars import plain_scalar
 
 MAX_DEPTH = 40
-MAX_NODES = 400_000
+MAX_NODES = 100_000
 MAX_FAULTS = 100
 
 Path_ = tuple[str | int, ...]
@@ -87,7 +87,7 @@ class Builder:
 
     def take(self, event: yaml.Event) -> None:
         """Process one event."""
-        mark = (event.start_mark.line + 1, event.start_mark.column + 1)
+        mark = (event.start_mark.line + 1, event.start_mark.column + 1) if event.start_mark else (1, 1)
         if isinstance(event, yaml.DocumentStartEvent):
             self.documents += 1
             if self.documents > 1:
@@ -102,7 +102,7 @@ class Builder:
             self._count(1, mark)
             self._add(_Node(value), mark, event.anchor)
         elif isinstance(event, yaml.AliasEvent):
-            self._repeat(event.anchor, mark)
+            self._repeat(event.anchor or "", mark)
         elif isinstance(event, yaml.MappingStartEvent | yaml.SequenceStartEvent):
             self._check_tag(event.tag, event.implicit, mark)
             self._count(1, mark)

@@ -53,6 +53,22 @@ def load_yaml(path: Path) -> YamlDocument:
     return parse_yaml(read_text(path), str(path))
 
 
+def is_folder(path: Path) -> bool:
+    """Whether a path is a folder; false, not an error, for one that cannot be looked at."""
+    try:
+        return path.is_dir()
+    except OSError:
+        return False
+
+
+def is_same_file(one: Path, other: Path) -> bool:
+    """Whether two paths lead to one existing file, through links too; false where one cannot be looked at."""
+    try:
+        return one.samefile(other)
+    except (OSError, ValueError):
+        return False
+
+
 def read_text(path: Path, max_bytes: int = MAX_BYTES) -> str:
     """Read a text file of bounded size.
 

@@ -135,6 +135,9 @@ def body_remarks(body: RigidBody, where: Where) -> Iterator[Remark]:
             message = "found mass 0 with a centre of mass or an inertia other than 0, expected a mass > 0; add the mass"
             yield Remark((*where, "mass"), message, "impossible")
         return
+    if max(body.mass.interval.sup, body.com.interval.mag.max(), body.inertia.interval.mag.max()) > HUGE:
+        yield Remark(where, f"found a value above {HUGE:g}, expected SI units; the tensor was not checked")
+        return
     if mass > MAX_MASS:
         message = f"found {mass:.4g} kg, expected at most {MAX_MASS:g} kg; check that the unit is kg"
         yield Remark((*where, "mass"), message)
@@ -144,24 +147,22 @@ def body_remarks(body: RigidBody, where: Where) -> Iterator[Remark]:
             f"expected at most {MAX_COM:g} m; check that the unit is m"
         )
         yield Remark((*where, "com"), message)
-    if max(body.mass.interval.sup, body.com.interval.mag.max(), body.inertia.interval.mag.max()) < HUGE:
-        yield from _inertia_remarks(body, mass, (*where, "inertia"))
-    else:
-        yield Remark(where, f"found a value above {HUGE:g}, expected SI units; the tensor was not checked")
+    yield from _inertia_remarks(body, mass, (*where, "inertia"))
 
 
 def _inertia_remarks(body: RigidBody, mass: float, where: Where) -> Iterator[Remark]:
     verdict = realizability(body)
     if not verdict.nominal:
         level: Level = "doubtful" if verdict.some else "impossible"
-        rest = "; some members of its box can" if verdict.some else "; no member of its box can" * (not _is_exact(body))
-        problem = _broken_rule(verdict.moments) + rest
-        yield Remark(where, f"no real body has this tensor: {problem}; {_advice(body)}", level)
+        scope = "this nominal tensor (some of its box are possible)" if verdict.some else "this tensor"
+        if not verdict.some and not _is_exact(body):
+            scope += ", nor any of its box"
+        yield Remark(where, f"no real body has {scope}: {_broken_rule(verdict.moments)}; {_advice(body)}", level)
     elif not verdict.every:
         problem = _broken_rule(verdict.worst)
         message = (
-            f"the nominal tensor is possible, but no real body has all values of its box: at the worst corner {problem}; "
-            "narrow the box, or accept bounds that are wider than they need to be"
+            f"no real body has some of the tensors of this box (the nominal one is possible): at the worst corner "
+            f"{problem}; narrow the box, or accept bounds that are wider than they need to be"
         )
         yield Remark(where, message)
     if verdict.nominal:

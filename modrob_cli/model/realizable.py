@@ -70,7 +70,8 @@ def realizability(body: RigidBody) -> Realizability:
     good = bool(np.linalg.eigvalsh(second_moments(nominal))[0] >= -TOLERANCE * size)
     every = bool(np.all(lowest >= -TOLERANCE * size))
     some = good or every or (len(matrices) > 1 and _some_member(body, size))
-    return Realizability(np.linalg.eigvalsh(nominal), good, every, some, np.linalg.eigvalsh(worst))
+    moments = np.asarray(np.linalg.eigvalsh(np.stack([nominal, worst])), dtype=float)
+    return Realizability(moments[0], good, every, some, moments[1])
 
 
 def _corners(body: RigidBody) -> tuple[Array, float]:

@@ -59,9 +59,9 @@ def draw_torques(picture: TorquePicture, path: Path) -> None:
             left.plot(*_thin(picture.t, series), color=color, linewidth=width, label=label)
         right.plot(*_thin(picture.t, residual[:, j]), color=RESIDUAL, linewidth=0.9, label="recorded - predicted")
         left.set_ylabel(f"torque [{picture.units[j]}]" if picture.units[j] == "N m" else f"force [{picture.units[j]}]")
-        # Names come from files: $ would start a formula.
-        left.set_title(picture.names[j].replace("$", r"\$"), loc="left", fontsize=10, fontweight="bold")
-        right.set_title(picture.captions[j], loc="right", fontsize=9)
+        # Names come from files: $ would start a formula. With y given, Matplotlib skips a slow search for a free place.
+        left.set_title(picture.names[j].replace("$", r"\$"), loc="left", y=1.0, fontsize=10, fontweight="bold")
+        right.set_title(picture.captions[j], loc="right", y=1.0, fontsize=9)
         for axis in (left, right):
             _shade(axis, picture)
             axis.grid(True, color="#e3e3e3", linewidth=0.6)

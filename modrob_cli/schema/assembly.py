@@ -1,9 +1,10 @@
 """``assembly/1``: modules bolted together."""
 
+from collections import Counter
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, StringConstraints
 from pydantic_core import PydanticCustomError
 
 from modrob_cli.interval import Interval
@@ -33,7 +34,7 @@ def _lift_list(value: Any) -> Any:
 
 
 FileList = Annotated[
-    list[str],
+    list[Annotated[str, StringConstraints(min_length=1, max_length=1000)]],
     Field(min_length=1, description="folders or files of modules, relative to this file"),
     BeforeValidator(_lift_list, json_schema_input_type=str | list[str]),
 ]
@@ -58,7 +59,7 @@ Disturbance = Annotated[
 
 def check_unique(names: list[str] | None) -> list[str] | None:
     """Refuse a list that names something twice."""
-    repeated = sorted({name for name in names or [] if (names or []).count(name) > 1})
+    repeated = sorted(name for name, count in Counter(names or []).items() if count > 1)
     if repeated:
         message = "Input should name each joint once, found again: {names}"
         raise PydanticCustomError("repeated", message, {"names": ", ".join(repeated)})

@@ -30,11 +30,13 @@ JointName = Annotated[
     Field(description="letters, digits, _ . # / + - and spaces, at most 128"),
 ]
 
+_LONGEST_ANGLE = 64
 _ANGLE = re.compile(
     r"(?P<sign>[-+]?)\s*"
-    r"(?:(?P<factor>[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)\s*\*?\s*)?"
+    r"(?:(?P<factor>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*\*?\s*)?"
     r"(?P<unit>pi|deg|rad)"
-    r"(?:\s*/\s*(?P<divisor>[0-9]*\.?[0-9]+))?\Z"
+    r"(?:\s*/\s*(?P<divisor>[0-9]+\.?[0-9]*|\.[0-9]+))?\Z",
+    re.ASCII,
 )
 
 
@@ -42,7 +44,7 @@ def parse_angle(value: Any) -> Any:
     """Angle in rad from a number or from text such as ``pi/2``, ``-3*pi/4``, ``-90 deg``, ``1.2 rad``."""
     if not isinstance(value, str):
         return value
-    match = _ANGLE.match(value.strip())
+    match = _ANGLE.match(value.strip()) if len(value) <= _LONGEST_ANGLE else None
     divisor = float(match["divisor"] or 1) if match else 0.0
     if match is None or divisor == 0.0 or (match["unit"] != "pi" and match["factor"] is None):
         raise PydanticCustomError("angle", "Input should be an angle: a number [rad], 'pi/2' or '-90 deg'")
@@ -69,6 +71,11 @@ def _lift_range(value: Any) -> Any:
     return [-value, value] if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
+def _lift_angle_range(value: Any) -> Any:
+    """Turn a plain angle, such as 2.9 or ``170 deg``, into a range about 0."""
+    return _lift_range(parse_angle(value))
+
+
 def _ordered(value: list[float]) -> tuple[float, float]:
     if value[0] > value[1]:
         raise PydanticCustomError("order", "Input should be [lower, upper] with lower <= upper, or one number >= 0")
@@ -86,7 +93,7 @@ AngleBounds = Annotated[
     list[Angle],
     Field(min_length=2, max_length=2),
     AfterValidator(_ordered),
-    BeforeValidator(_lift_range, json_schema_input_type=float | list[float | str]),
+    BeforeValidator(_lift_angle_range, json_schema_input_type=float | str | list[float | str]),
     Field(description="[lower, upper], or one number r for [-r, r]; [rad] or [m]"),
 ]
 

@@ -14,13 +14,14 @@ from modrob_cli.model.body import INERTIA_ENTRIES
 from modrob_cli.model.uncertain import Uncertain
 from modrob_cli.schema.base import Document
 
-_PERCENT = re.compile(r"\s*([0-9]+(?:\.[0-9]*)?|\.[0-9]+)\s*%\s*\Z")
+_LONGEST_PERCENTAGE = 40
+_PERCENT = re.compile(r"\s*([0-9]+(?:\.[0-9]*)?|\.[0-9]+)\s*%\s*\Z", re.ASCII)
 
 
 def _parse_tolerance(value: Any) -> Any:
     """Keep numbers; turn ``5%`` into a Fraction of the nominal value, with its sign as the mark."""
     if isinstance(value, str):
-        match = _PERCENT.match(value)
+        match = _PERCENT.match(value) if len(value) <= _LONGEST_PERCENTAGE else None
         if match is None:
             raise PydanticCustomError("tol", "Input should be a number >= 0 or a percentage such as '5%'")
         return Percent(Fraction(match[1]) / 100)
@@ -58,7 +59,7 @@ def _outward(value: Fraction, toward: float) -> float:
     try:
         nearest = float(value)
     except OverflowError:
-        raise PydanticCustomError("tol", "Input should give finite bounds") from None
+        return toward
     inside = Fraction(nearest) > value if toward < 0 else Fraction(nearest) < value
     return math.nextafter(nearest, toward) if inside else nearest
 
@@ -87,6 +88,8 @@ class ScalarSpec(Document):
                     "nominal", "Input should have nominal {value} inside [min, max] = [{low}, {high}]",
                     {"value": self.nominal, "low": self.min, "high": self.max},
                 )  # fmt: skip
+        if not all(math.isfinite(bound) for bound in self.bounds):
+            raise PydanticCustomError("tol", "Input should give finite bounds")
         return self
 
     @property
@@ -139,8 +142,9 @@ def _lift_vector(value: Any) -> Any:
     """Accept {nominal: [x, y, z], tol: 5%} where a list of three uncertain numbers is expected."""
     if not (isinstance(value, dict) and "nominal" in value):
         return value
-    lists = [part for part in value.values() if isinstance(part, list)]
-    if not isinstance(value["nominal"], list) or any(len(part) != 3 for part in lists):
+    many = [part for part in value.values() if isinstance(part, list | dict)]
+    fits = all(isinstance(part, list) and len(part) == 3 for part in many)
+    if not (fits and isinstance(value["nominal"], list)):
         raise PydanticCustomError("vector", "Input should have lists of three numbers as nominal, min, max and tol")
     return list(_spread(value, (0, 1, 2), lambda content, key: content[key]).values())
 
@@ -182,7 +186,7 @@ def _from_matrix(value: Any) -> Any:
     for i, j in ((0, 1), (0, 2), (1, 2)):
         if value[i][j] != value[j][i]:
             raise PydanticCustomError("tensor", "Input should be a symmetric 3 x 3 list")
-    return {a + b: value["xyz".index(a)]["xyz".index(b)] for a, b in INERTIA_ENTRIES}
+    return {entry: value["xyz".index(entry[0])]["xyz".index(entry[1])] for entry in INERTIA_ENTRIES}
 
 
 def _lift_inertia(value: Any) -> Any:

@@ -1,5 +1,6 @@
 """``robot/1``: an arm as a chain of joints and bodies; written by ``modrob assemble`` or by hand."""
 
+from collections import Counter
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -59,7 +60,7 @@ class RobotBodySpec(BodySpec):
 
 def _unique_names(joints: list[RobotJointSpec]) -> list[RobotJointSpec]:
     names = [joint.name for joint in joints]
-    repeated = sorted({name for name in names if names.count(name) > 1})
+    repeated = sorted(name for name, count in Counter(names).items() if count > 1)
     if repeated:
         message = "Input should name each joint once, found again: {names}"
         raise PydanticCustomError("repeated", message, {"names": ", ".join(repeated)})

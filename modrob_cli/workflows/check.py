@@ -11,7 +11,7 @@ from modrob_cli.assembly.synthesis import synthesize
 from modrob_cli.errors import Fault, InputFileError, ModrobError
 from modrob_cli.io.catalogue import Catalogue, read_assembly, yaml_files
 from modrob_cli.io.documents import check_document, kind_of
-from modrob_cli.io.yaml_loader import YamlDocument, load_yaml
+from modrob_cli.io.yaml_loader import YamlDocument, is_folder, load_yaml
 from modrob_cli.model.plausibility import Remark, assembly_remarks, module_remarks, robot_remarks
 from modrob_cli.schema import AssemblyDocument, ModuleDocument, RobotDocument
 
@@ -90,7 +90,7 @@ def check(paths: list[Path]) -> CheckResult:
 
 
 def _documents(path: Path) -> list[Path]:
-    if not path.is_dir():
+    if not is_folder(path):
         return [path]
     found = sorted(yaml_files(path))
     if not found:

@@ -19,6 +19,8 @@ from modrob_cli.model.robot import Robot
 
 DH_HEADER = ("joint", "type", "a", "alpha", "d", "theta", "gamma", "p", "n")
 LINK_QUANTITIES = ("mass", *(f"com_{x}" for x in "xyz"), *(f"inertia_com_{entry}" for entry in INERTIA_ENTRIES))
+EXACT = 1e-9
+"""Widths below this [kg, m, kg m^2] are rounding, not uncertainty."""
 DRIVE_QUANTITIES = ("viscous", "coulomb", "rotor_inertia")
 Json = dict[str, Any]
 
@@ -90,9 +92,18 @@ class RobotTables:
         tight = np.concatenate([self.tight.mass.wid[:, None], self.tight.com.wid, self.tight.inertia_com.wid], axis=1)
         wide = [self.published.mass.wid[:, None], self.published.com.wid, self.published.inertia_com.wid]
         published = np.concatenate(wide, axis=1)
-        scale = np.abs(np.array([self._nominal(i) for i in range(self.robot.dof)])).max(initial=1e-12)
-        open_ = (tight > 1e-9 * scale) & np.isfinite(published)
+        open_ = (tight > EXACT) & np.isfinite(published)
         return float(np.median(published[open_] / tight[open_])) if open_.any() else None
+
+    def widths(self, i: int) -> list[tuple[float, float]]:
+        """Widest (tight, published) widths of link i: mass, centre of mass, inertia; 0 where exact to rounding."""
+        pairs = []
+        for quantity in ("mass", "com", "inertia_com"):
+            tight = np.atleast_1d(getattr(self.tight, quantity)[i].wid)
+            published = np.atleast_1d(getattr(self.published, quantity)[i].wid)
+            k = int(tight.argmax())
+            pairs.append((float(tight[k]) if tight[k] > EXACT else 0.0, float(published[k])))
+        return pairs
 
     def to_json(self) -> Json:
         """The result of ``modrob assemble`` for one robot, without its files."""

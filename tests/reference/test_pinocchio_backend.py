@@ -27,8 +27,8 @@ def body(
     pose: Array | None = None,
     link: int = 1,
 ) -> PlacedBody:
-    parts = (Uncertain.exact(value) for value in (mass, com, inertia))
-    return PlacedBody(link, np.eye(4) if pose is None else pose, RigidBody("b", *parts, inertia_about=about))
+    m, c, entries = (Uncertain.exact(value) for value in (mass, com, inertia))
+    return PlacedBody(link, np.eye(4) if pose is None else pose, RigidBody("b", m, c, entries, about))
 
 
 def robot(joints: list[Joint], bodies: list[PlacedBody], gravity: Any = GRAVITY) -> Robot:

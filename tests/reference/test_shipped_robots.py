@@ -73,14 +73,13 @@ def test_robot_file_and_urdf_read_back_as_the_same_robot(path: Path, built: dict
             np.testing.assert_array_equal(before.nominal, after.nominal)
             np.testing.assert_array_equal(before.interval.inf, after.interval.inf)
             np.testing.assert_array_equal(before.interval.sup, after.interval.sup)
-    for mine, theirs in zip(robot.joints, again.joints, strict=True):
-        assert mine.limits == theirs.limits
-        assert float(mine.friction.viscous.nominal) == float(theirs.friction.viscous.nominal)
-        assert mine.drive.gear_ratio == theirs.drive.gear_ratio
+    for joint, same in zip(robot.joints, again.joints, strict=True):
+        assert joint.limits == same.limits
+        assert float(joint.friction.viscous.nominal) == float(same.friction.viscous.nominal)
+        assert joint.drive.gear_ratio == same.drive.gear_ratio
     from_urdf = read_urdf(Path(files["urdf"]))
-    turned = np.einsum("ij,j->i", np.eye(3), robot.gravity)
     model = build_model(from_urdf)
-    model.gravity = pin.Motion(turned, np.zeros(3))
+    model.gravity = pin.Motion(robot.gravity, np.zeros(3))
     assert np.abs(torques(model, states) - expected).max() < 1e-9 * scale
 
 

@@ -44,10 +44,10 @@ def test_derivatives_of_sines(recorded: bool, jitter: float) -> None:
     assert signals.resampled == (jitter > 0)
     assert signals.cutoff == 10.0
     np.testing.assert_array_equal(signals.moving, [True, True])
-    # At 0.7 Hz the filter takes (0.7/10)^8 = 6e-10 of the amplitude; what an end of the log leaves after one period of
-    # the cut-off is below 1e-3 of the second derivative (20 rad/s^2).
+    # At 0.7 Hz the filter takes (0.7/10)^8 = 6e-10 of the amplitude; what an end of the log leaves after two periods of
+    # the cut-off is below 5e-3 of the second derivative, and far less of the others.
     for mine, true in zip((signals.q, signals.dq, signals.ddq), exact, strict=True):
-        np.testing.assert_allclose(mine[signals.used], true[signals.used], rtol=0, atol=1e-3 * np.abs(true).max())
+        np.testing.assert_allclose(mine[signals.used], true[signals.used], rtol=0, atol=5e-3 * np.abs(true).max())
     np.testing.assert_allclose(signals.effort, signals.t[:, None] * [1.0, 2.0], rtol=0, atol=1e-9)
 
 
@@ -66,16 +66,16 @@ def test_ends_and_gaps_are_not_used() -> None:
     signals = prepare(make_log(t, q, dq), cutoff=5.0)
     assert signals.resampled
     assert signals.gap == pytest.approx(0.608, abs=1e-6)
-    inside = (signals.t > 3.8) & (signals.t < 4.8)
+    inside = (signals.t > 3.6) & (signals.t < 5.0)
     assert not signals.used[inside].any()
-    assert not signals.used[signals.t < 0.199].any()
-    assert signals.used[(signals.t > 0.21) & (signals.t < 3.79)].all()
+    assert not signals.used[signals.t < 0.399].any()
+    assert signals.used[(signals.t > 0.41) & (signals.t < 3.59)].all()
 
 
 def test_lost_messages_are_no_gap() -> None:
     t = np.delete(even_times(), np.random.default_rng(2).integers(100, 2900, size=200))
     signals = prepare(make_log(t, sines(t)[0]))
-    assert np.count_nonzero(~signals.used) == pytest.approx(2 * 0.1 * RATE, abs=3)
+    assert np.count_nonzero(~signals.used) == pytest.approx(2 * 0.2 * RATE, abs=3)
 
 
 def test_cut_off_and_length_are_checked() -> None:
@@ -85,7 +85,7 @@ def test_cut_off_and_length_are_checked() -> None:
         with pytest.raises(UsageError, match="less than half the sampling rate"):
             prepare(log, cutoff)
     with pytest.raises(NumericalError, match="lasts"):
-        prepare(make_log(t[:60], sines(t[:60])[0]))
+        prepare(make_log(t[:120], sines(t[:120])[0]))
     slow = t[::25]
     assert prepare(make_log(slow, sines(slow)[0])).cutoff == pytest.approx(2.5)
 
