@@ -100,8 +100,8 @@ def _skew(T: Array, sine: float) -> CommonNormal:
         normal, V = -normal, -V
     phi = math.atan2(normal[1], normal[0])
     alpha = math.atan2(sine if backward else -sine, T[2, 2])
-    # From the rounded phi and alpha on, so that their rounding is not amplified: near alpha = pi the spacing of
-    # doubles is 4e-16, and n = L / sin(alpha) would be off by 4e-16 L / sin(alpha)^2.
+    # From the rounded phi and alpha on, so that their rounding cancels: near alpha = pi the spacing of doubles is
+    # 4e-16, and n sin(alpha) with any other sine would miss the offset by 2e-16 L / sin(alpha), doubling the error.
     c, s = math.cos(phi), math.sin(phi)
     n = float(s * T[0, 3] - c * T[1, 3]) / math.sin(alpha)
     p = n * math.cos(alpha) - float(T[2, 3])

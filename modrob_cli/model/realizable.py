@@ -69,7 +69,7 @@ def realizability(body: RigidBody) -> Realizability:
     nominal = inertia_about_com(body)
     good = bool(np.linalg.eigvalsh(second_moments(nominal))[0] >= -TOLERANCE * size)
     every = bool(np.all(lowest >= -TOLERANCE * size))
-    some = good or every or (len(matrices) > 1 and _some_member(body, size))
+    some = good or every or _some_member(body, size)
     moments = np.asarray(np.linalg.eigvalsh(np.stack([nominal, worst])), dtype=float)
     return Realizability(moments[0], good, every, some, moments[1])
 
@@ -113,9 +113,11 @@ def _has_semidefinite_member(constant: Array, slopes: Array, lower: Array, upper
     Each eigenvector v of a failed attempt gives the cut t <= v' F(x) v; the linear programme's optimum t bounds the
     largest possible smallest eigenvalue from above.
     """
+    x = 0.5 * lower + 0.5 * upper
+    if np.array_equal(lower, upper):
+        return bool(np.linalg.eigvalsh(constant + np.tensordot(x, slopes, 1))[0] >= -TOLERANCE)
     from scipy.optimize import linprog
 
-    x = 0.5 * lower + 0.5 * upper
     rows: list[Array] = []
     sides: list[Array] = []
     for _ in range(_MAX_CUTS):

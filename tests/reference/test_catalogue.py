@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from modrob_cli.arrays import Array
+from modrob_cli.assembly.dh_synthesis import dh_table
+from modrob_cli.assembly.link_parameters import link_parameters
 from modrob_cli.dynamics.pinocchio_backend import inverse_dynamics
 from modrob_cli.interval import Interval
 from modrob_cli.io.documents import check_document
@@ -81,14 +83,18 @@ def test_peak_torques_are_what_the_currents_give() -> None:
 
 
 def test_printed_table_agrees_with_the_modules() -> None:
-    # [D] Table 3.4 prints three digits; d_6 there is 0.155 for 0.1548
-    printed, built = arm("lwa4p-table34"), arm("lwa4p-6")
-    rng = np.random.default_rng(1)
-    q, dq, ddq = rng.uniform(-2, 2, (3, 20, 6))
-    poses = printed.link_frames(q)[:, -1] - built.link_frames(q)[:, -1]
-    assert np.abs(poses).max() < 2.5e-4
-    difference = inverse_dynamics(printed, q, dq, ddq) - inverse_dynamics(built, q, dq, ddq)
-    assert np.abs(difference).max() < 0.05  # masses agree, lever arms to 0.5 mm of 4.3 kg x 9.81 m/s^2 and more
+    # [D] Table 3.4 prints the numbers of the synthesis, rounded: lengths to 0.5 mm, tensors to 0.05e-3 kg m^2
+    robots = arm("lwa4p-table34"), arm("lwa4p-6")
+    printed, built = (link_parameters(robot, dh_table(robot).frames) for robot in robots)
+    np.testing.assert_allclose(printed.mass, built.mass, atol=1e-15)
+    np.testing.assert_allclose(printed.com, built.com, atol=5.1e-4)
+    np.testing.assert_allclose(printed.inertia_com, built.inertia_com, atol=5.1e-5)
+    q = np.random.default_rng(1).uniform(-2, 2, (20, 6))
+    np.testing.assert_allclose(robots[0].link_frames(q)[:, -1], robots[1].link_frames(q)[:, -1], atol=2.1e-4)  # d_6
+    for joint, other in zip(robots[0].joints, robots[1].joints, strict=True):
+        assert joint.limits == other.limits
+        assert repr(joint.drive) == repr(other.drive)  # repr shows every digit
+        assert repr(joint.friction) == repr(other.friction)
 
 
 def test_uncertain_last_links_of_the_published_arms() -> None:

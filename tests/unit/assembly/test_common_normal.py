@@ -71,7 +71,8 @@ def test_nearly_parallel_axes_lose_the_stated_accuracy_only(base: float, angle: 
         assert d.case == "skew"
         error = np.abs(d.transform() - T)
         assert error[:3, :3].max() < 1e-15  # a few roundings of numbers below 1
-        assert error[:3, 3].max() < 4e-16 / angle  # the docstring's 1.4e-16 / angle, with a margin
+        # the docstring's 1.4e-16 / angle with a margin; a sine that does not fit the rounded alpha gives 2.2e-16
+        assert error[:3, 3].max() < 1.8e-16 / angle
 
 
 @pytest.mark.parametrize("base", [0.0, math.pi])

@@ -96,6 +96,19 @@ def test_extended_link_byte_by_byte() -> None:
     assert encode_extended(a_link(), "file") == content + struct.pack("<I", zlib.crc32(content))
 
 
+def test_extended_joint_byte_by_byte() -> None:
+    raw = encode_extended(a_joint(), "file")
+    body = b"\0" + b"".join(struct.pack("<f", x) * 3 for x in (2.0, 0.1, 0.2, 0.3, 0.5, 0.01, 0.02, 0.6, 0.03, 0.7))
+    content = b"\x02J1" + b"\x06\0source" + b"\x04\0text" + struct.pack("<5d", 1, 2, 3, 4, 5) + body
+    content += struct.pack("<Bd", 1, 0.25) + b"".join(struct.pack("<f", x) * 3 for x in (15.68, 7.14, 5.23e-5))
+    content += struct.pack("<3d", 0.5, 0.01, 160)
+    # present: position (bit 0), current (5), torque constant (6), stiffness (7)
+    content += struct.pack("<B6d", 0b11100001, -2.9, 2.8, -11, 11, 0.0429, 4650)
+    content += struct.pack("<5d", 6, 7, 8, 9, 10) + body
+    assert raw[16 : 16 + len(content)] == content
+    assert len(content) == 3 + 8 + 6 + 392 + 2 * 16 + 2 * 8  # sizes in docs/storage.md
+
+
 @pytest.mark.parametrize("module", [a_joint(), a_joint(3), a_link()], ids=["joint", "units", "link"])
 def test_extended_form_gives_everything_back(module: StoredModule, tmp_path: Path) -> None:
     path = tmp_path / "module.bin"
