@@ -4,7 +4,7 @@ from collections import Counter
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from modrob_cli.arrays import Array
@@ -88,17 +88,24 @@ class RobotDocument(Document):
     payload: BodySpec | None = Field(default=None, description="body at the end effector, in the tool frame")
     disturbance: Disturbance = [[0.0, 0.0]]
 
-    @model_validator(mode="after")
-    def _counts(self) -> Self:
-        n = len(self.joints)
-        if len(self.disturbance) not in (1, n):
-            message = "Input should have one disturbance, or one for each of {n} joints"
-            raise PydanticCustomError("count", message, {"n": n})
-        worst = max((body.link for body in self.bodies), default=0)
-        if worst > n:
+    @field_validator("bodies")
+    @classmethod
+    def _links_exist(cls, bodies: list[RobotBodySpec], info: ValidationInfo) -> list[RobotBodySpec]:
+        n = len(info.data.get("joints", ()))
+        worst = max((body.link for body in bodies), default=0)
+        if "joints" in info.data and worst > n:
             message = "Input should have bodies on links 0 to {n}, found link {worst}"
             raise PydanticCustomError("count", message, {"n": n, "worst": worst})
-        return self
+        return bodies
+
+    @field_validator("disturbance")
+    @classmethod
+    def _one_or_each(cls, disturbance: list[list[float]], info: ValidationInfo) -> list[list[float]]:
+        n = len(info.data.get("joints", ()))
+        if "joints" in info.data and len(disturbance) not in (1, n):
+            message = "Input should have one disturbance, or one for each of {n} joints"
+            raise PydanticCustomError("count", message, {"n": n})
+        return disturbance
 
     def to_model(self) -> Robot:
         """Return the robot; link frames are the joint frames carried along by the motion."""

@@ -11,6 +11,7 @@ from modrob_cli.assembly.dh_synthesis import dh_table
 from modrob_cli.assembly.interval_published import published_intervals
 from modrob_cli.assembly.interval_tight import tight_intervals
 from modrob_cli.assembly.link_parameters import LinkIntervals, LinkParameters, link_parameters
+from modrob_cli.errors import NumericalError
 from modrob_cli.interval import Interval
 from modrob_cli.io.csv_writer import csv_text
 from modrob_cli.model.body import INERTIA_ENTRIES
@@ -37,10 +38,21 @@ class RobotTables:
 
     @classmethod
     def of(cls, robot: Robot) -> "RobotTables":
-        """Compute all tables of a robot."""
-        dh = dh_table(robot)
-        links = link_parameters(robot, dh.frames)
-        return cls(robot, dh, links, tight_intervals(robot, dh.frames), published_intervals(robot, dh.frames))
+        """Compute all tables of a robot.
+
+        Raises
+        ------
+        NumericalError
+            If its numbers are so large that a parameter is not finite.
+        """
+        with np.errstate(all="ignore"):
+            dh = dh_table(robot)
+            links = link_parameters(robot, dh.frames)
+            values = (dh.a, dh.d, dh.p, dh.n, links.mass, links.com, links.inertia_com)
+            if not all(np.isfinite(value).all() for value in values):
+                message = "the masses or lengths are too large to compute with; modrob check says where they are"
+                raise NumericalError(f"{robot.name}: {message}")
+            return cls(robot, dh, links, tight_intervals(robot, dh.frames), published_intervals(robot, dh.frames))
 
     def dh_rows(self) -> list[tuple[Any, ...]]:
         """Rows of the D-H table in the order of ``DH_HEADER``; d and theta at q = 0."""

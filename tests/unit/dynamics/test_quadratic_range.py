@@ -37,12 +37,12 @@ def exact_range(b: Array, Q: Array, r: Array) -> tuple[Fraction, Fraction]:
     """
     fb, fr = [Fraction(float(x)) for x in b], [Fraction(float(x)) for x in r]
     fQ = [[Fraction(0)] * 3 for _ in range(3)]
-    for (i, j), value in zip(ENTRIES, Q, strict=True):
-        fQ[i][j] = fQ[j][i] = Fraction(float(value))
+    for (i, j), number in zip(ENTRIES, Q, strict=True):
+        fQ[i][j] = fQ[j][i] = Fraction(float(number))
 
     def value(x: Rational) -> Fraction:
-        square = sum(x[i] * fQ[i][j] * x[j] for i in range(3) for j in range(3))
-        return square + sum(fb[i] * x[i] for i in range(3))
+        square = sum((x[i] * fQ[i][j] * x[j] for i in range(3) for j in range(3)), Fraction(0))
+        return square + sum((fb[i] * x[i] for i in range(3)), Fraction(0))
 
     values = []
     for choice in product((-1, 0, 1), repeat=3):

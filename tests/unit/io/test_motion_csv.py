@@ -129,7 +129,7 @@ def test_thousands_of_faults_are_counted(tmp_path: Path) -> None:
         ("t,q.A,q.J #2,dq.A,dq.J #2,ddq.A,ddq.J #2", "found the joints A, J #2; the robot has base.1, J #2"),
         ("t,q.base.1,dq.base.1,ddq.base.1", "found the joints base.1; the robot has base.1, J #2"),
         ("t,q.base.1,q.J #2,dq.base.1,dq.J #2", "found no accelerations, expected the columns ddq.base.1, ddq.J #2"),
-        ("t,q.base.1,q2,dq.base.1,dq.J #2,ddq.base.1,ddq.J #2", "found the joints base.1, J #2; the robot"),
+        ("t,q.base.1,q2,dq.base.1,dq.J #2,ddq.base.1,ddq.J #2", "the columns q.J #2 are missing"),
         (ROW, "found numbers in the first line, expected a header: t,q1..q2"),
         (NUMBERED.replace(",", ";"), "found semicolons between the columns, expected commas"),
         ("modrob: trajectory/1", "found no positions"),
@@ -166,7 +166,7 @@ def test_places_without_a_file(tmp_path: Path) -> None:
         (tmp_path / "none.csv", "file not found"),
         (Path("/dev/null"), "is not a regular file"),
         (tmp_path / ("n" * 300), "File name too long"),
-        (tmp_path / "a\0b", "null"),
+        (tmp_path / "a\0b", "file not found"),
     ):
         with pytest.raises(InputFileError, match=words):
             read(path)
