@@ -93,7 +93,9 @@ class Ball:
 def stack(parts: Sequence[Ball], axis: int = 0) -> Ball:
     """Join balls along a new axis."""
     shapes = np.broadcast_shapes(*(part.c.shape for part in parts))
-    centres, radii = ([np.broadcast_to(x, shapes) for x in side] for side in zip(*((b.c, b.r) for b in parts), strict=True))
+    centres, radii = (
+        [np.broadcast_to(x, shapes) for x in side] for side in zip(*((b.c, b.r) for b in parts), strict=True)
+    )
     return Ball(np.stack(centres, axis), np.stack(radii, axis))
 
 

@@ -5,29 +5,34 @@ Kinematics in numbers, forces and moments in intervals:
 .. math:: [a_c] = a + \alpha \times [c] + \omega \times (\omega_a \times [c]), \quad [F] = [m]\,[a_c], \quad
           [n] = [c] \times [F] + [I]\,\alpha + \omega_a \times ([I]\,\omega),
 
-summed from the tip to the base. [m] and [c] of a link enter several times, and intervals are turned from frame to frame,
-so the bounds are wider than the exact ones (:mod:`modrob_cli.dynamics.exact_bounds`). They are kept for
-comparison and for the published figures.
+summed from the tip to the base. [m] and [c] of a link enter several times, and intervals are turned from frame to
+frame, so the bounds are wider than the exact ones (:mod:`modrob_cli.dynamics.exact_bounds`). They are kept for
+comparison and for the published figures. With an interval [ddq], accelerations are intervals too.
 
-With an interval [ddq], accelerations are intervals too. Difference from the publication: joint frames are placed by
-transforms, not D-H rows, and moments are taken about the link frame's origin, on the joint's axis.
+Difference from the publication: links are placed by transforms, not D-H rows. A link's interval formulas are evaluated
+in the frame in which its parameters are given; with D-H frames they are the published ones.
 
-Rounding. Ends are computed in round-to-nearest and moved outward by a proven margin. Let T be the true torque for some
-admissible parameters. Per link, its force and moment lie within mid +- rad (half-widths by component) plus an error e;
-the torque is a sum of exact linear maps (turns and levers) of these vectors.
+Rounding. Ends are computed in round-to-nearest and moved outward by a proven margin. For each link, its true force and
+moment are mid + d with abs(d) <= rad in each component, but for rounding errors e; the torque is a sum of linear maps
+(turns, levers) of these vectors.
 
-1. Midpoints: as in :mod:`modrob_cli.dynamics.margin`, whose magnitude S_j is taken over these boxes, over the larger of
-   \|dq\|, \|dq_a\| and over \|ddq\| plus its tolerance. Interval operations form the same products from ends of the same
-   magnitude. Sums of absolute values in a cross product exceed the product of the lengths by at most 2 / sqrt(3), three
-   in a row by 1.54; hence 2 S_j.
-2. Half-widths are sums of non-negative products of what was computed: off by at most the same number of roundings
-   times themselves. Ends of an interval product are off by roundings of midpoint (in S_j) and half-width.
-3. Exact maps L differ from the computed ones, L', by roundings. Within rad, \|L' d\| <= \|L'\| rad is what is summed, and
-   (L - L') d is below roundings times the length of rad, which is part of S_j or of the summed half-width.
+1. Midpoints: the steps of :mod:`modrob_cli.dynamics.margin`, with its magnitude S_j taken over these boxes, over the
+   larger of abs(dq) and abs(dq_a), and over abs(ddq) plus its tolerance. Interval operations multiply ends of the same
+   magnitudes. A cross product of absolute values is at most 2 / sqrt(3) times as long as the product of the lengths;
+   three in a row make 1.54; hence 2 S_j. What the width of a factor adds to the midpoint of a product is at most the
+   product's half-width.
+2. Half-widths are sums of products of non-negative numbers: off by the number of roundings times themselves. Ends of a
+   product of intervals are off by roundings times midpoint (in S_j) plus half-width, component by component.
+3. Computed maps L' differ from the true ones L by roundings: L d = L' d + (L - L') d. The first is within what is
+   summed, abs(L') rad. The second is at most roundings times the length of d, which S_j contains: half-widths of links
+   arise at the link itself, and those of [ddq] enter S_j times a bound of what turning boxes adds (``_growth``). An
+   error e is turned by L, not by abs(L), so it does not grow; one in proportion to a half-width grows with it.
 
-So the margin is roundings(n) u (2 S_j + rad_j); the number of roundings per joint and per link is that of the exact bounds.
+So the margin is roundings(n) u (2 S_j + rad_j) plus that of the drives; roundings per joint and per link are as many as
+for the exact bounds.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -64,6 +69,7 @@ class _Prepared:
     nominal: list[LinearParameters]
     drives: list[DriveBox]
     tolerance: Array | None
+    growth: float
 
 
 def ianea(
@@ -100,11 +106,11 @@ def ianea(
     dq_a = dq if dq_a is None else dq_a
     by_joint(robot, q, dq, dq_a, ddq)
     prepared = _prepare(robot, links, ddq_tolerance)
-    parts = []
-    for start in range(0, max(len(q), 1), CHUNK):
+    pieces = [TorqueBounds.empty(robot.dof)]
+    for start in range(0, len(q), CHUNK):
         piece = slice(start, start + CHUNK)
-        parts.append(_chunk(prepared, *by_joint(robot, q[piece], dq[piece], dq_a[piece], ddq[piece])))
-    return TorqueBounds(*(np.concatenate([part[k] for part in parts], axis=1).T.copy() for k in range(3)))
+        pieces.append(_chunk(prepared, *by_joint(robot, q[piece], dq[piece], dq_a[piece], ddq[piece])))
+    return TorqueBounds.joined(pieces)
 
 
 def _prepare(robot: Robot, links: LinkBoxes, tolerance: Array | None) -> _Prepared:
@@ -117,33 +123,40 @@ def _prepare(robot: Robot, links: LinkBoxes, tolerance: Array | None) -> _Prepar
             raise NumericalError("ddq_tolerance: found a negative value or NaN, expected half-widths >= 0")
         tolerance = tolerance if tolerance.any() else None
     sized = replace(robot, bodies=links.bodies())
-    return _Prepared(robot, sized, link_boxes(links), nominal_links(robot), drive_boxes(robot), tolerance)
+    boxes, nominal = link_boxes(links), nominal_links(robot)
+    return _Prepared(robot, sized, boxes, nominal, drive_boxes(robot), tolerance, _growth(robot, boxes))
 
 
-def _chunk(prepared: _Prepared, q: Array, dq: Array, dq_a: Array, ddq: Array) -> tuple[Array, Array, Array]:
-    """Nominal, lower and upper (n, T) of one chunk; states of shape (n, T)."""
-    robot = prepared.robot
+def _growth(robot: Robot, links: list[LinkBox]) -> float:
+    """Bound of how much longer the vector of half-widths gets by all turns between base and tip together."""
+    turns = [float(np.linalg.norm(np.abs(joint.zero_placement[:3, :3]), 2)) for joint in robot.joints]
+    own = max(float(np.linalg.norm(np.abs(link.R), 2)) for link in links)
+    return math.prod(turns, start=own) * math.sqrt(2.0) ** robot.dof
+
+
+def _chunk(prepared: _Prepared, q: Array, dq: Array, dq_a: Array, ddq: Array) -> TorqueBounds:
+    """Bounds of one chunk; states of shape (n, T)."""
+    robot, count = prepared.robot, q.shape[1]
+    tolerance = np.zeros(robot.dof) if prepared.tolerance is None else prepared.tolerance
     positions = joint_positions(robot, q)
     motions = star_motions(robot, positions, dq, dq_a, ddq)
-    widths = _motion_widths(positions, prepared.tolerance, q.shape[1])
     nominal = star_backward(positions, motions, prepared.nominal)
-    mid, rad = _backward(positions, motions, widths, prepared.links)
+    mid, rad = _backward(positions, motions, _motion_widths(positions, prepared.tolerance, count), prepared.links)
+    speed = np.maximum(np.abs(dq), np.abs(dq_a))
+    most = np.abs(ddq) + prepared.growth * tolerance[:, None]
+    magnitude = 2.0 * torque_magnitude(prepared.sized, q, speed, most) + rad
     lower, upper = mid - rad, mid + rad
-    size = np.empty_like(mid)
-    most = np.abs(ddq) if prepared.tolerance is None else np.abs(ddq) + prepared.tolerance[:, None]
     for i, drive in enumerate(prepared.drives):
-        ends = _drive_range(drive, dq[i], ddq[i], 0.0 if prepared.tolerance is None else prepared.tolerance[i])
+        ends = _drive_range(drive, dq[i], ddq[i], tolerance[i])
         lower[i] += ends[0]
         upper[i] += ends[1]
         nominal[i] += drive_nominal(robot.joints[i], dq[i], ddq[i])
-        size[i] = drive.magnitude(dq[i], most[i])
-    speed = np.abs(dq) if dq_a is dq else np.maximum(np.abs(dq), np.abs(dq_a))
-    magnitude = 2.0 * torque_magnitude(prepared.sized, q, speed, most) + rad + size
+        magnitude[i] += drive.magnitude(dq[i], most[i])
     margin = rounding_margin(robot.dof, magnitude)
     lower, upper = lower - margin, upper + margin
     if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
         raise NumericalError("a torque bound is not finite; check the motion and the model for absurd values")
-    return nominal, lower, upper
+    return TorqueBounds(*(np.ascontiguousarray(part.T) for part in (nominal, lower, upper)))
 
 
 def _drive_range(drive: DriveBox, dq: Array, ddq: Array, tolerance: float) -> tuple[Array, Array]:

@@ -21,8 +21,8 @@ class LinkBoxes:
     mass : shape (n,), [kg];  com : shape (n, 3), [m]
     inertia_com : tensor entries xx, xy, xz, yy, yz, zz about the centre of mass, shape (n, 6), [kg m^2]
     frames : the frames in which these are given, in the frames of the links, shape (n, 4, 4): identity for the
-        links' own frames; D-H frames, or the frame of the one body of a link, are other choices. Interval results
-        depend on it.
+        links' own frames; the published algorithm uses D-H frames. Width depends on this choice, because the centre
+        of mass counts from the frame's origin.
     """
 
     mass: Interval
@@ -47,10 +47,13 @@ class LinkBoxes:
         """The same boxes as bodies fixed to the links; nominal values are midpoints."""
         parts = []
         for i, pose in enumerate(self.frames):
-            boxes = (self.mass[i], self.com[i], self.inertia_com[i])
-            uncertain = (Uncertain(frozen(box.mid, box.shape), box) for box in boxes)
-            parts.append(PlacedBody(i + 1, pose, RigidBody(f"link {i + 1}", *uncertain)))
+            mass, com, inertia = (_centred(part[i]) for part in (self.mass, self.com, self.inertia_com))
+            parts.append(PlacedBody(i + 1, pose, RigidBody(f"link {i + 1}", mass, com, inertia)))
         return tuple(parts)
+
+
+def _centred(box: Interval) -> Uncertain:
+    return Uncertain(frozen(box.mid, box.shape), box)
 
 
 @dataclass(frozen=True)

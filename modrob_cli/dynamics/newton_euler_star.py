@@ -4,15 +4,19 @@ Two joint velocities, dq and the auxiliary dq_a, keep the Coriolis terms apart:
 
 .. math:: \tau = M(q)\,\ddot q + C(q, \dot q)\,\dot q_a + g(q), \qquad x'(\dot M - 2 C)\,x = 0.
 
-With the Jacobians J of the links' angular velocities and of their centres of mass, the recursion computes
-:math:`\dot J \dot q_a` exactly, also for prismatic joints, which makes the translational part of C equal to
-:math:`J' m \dot J`. The rotational part is :math:`J'(I \dot J \dot q_a + ...)` with
-:math:`\omega_a \times I \omega` in place of :math:`\omega \times I \omega_a`; the two differ by what
-:math:`I(\omega \times \omega_a)` gives, and the property holds.
+Per link, with the velocities of its centre of mass :math:`v = J_v \dot q` in axes at rest and its angular velocity
+:math:`\omega = J_\omega \dot q` in its own axes, where its tensor I is constant,
 
-This C is not the symmetric one of Christoffel symbols: it differs from it by
-:math:`\tfrac12 \mathrm{tr}(I)\,\omega_a \times \omega` per link, with the tensor about the centre of mass. So it
-depends on how bodies are joined to links (here: one link per joint, as published); for dq_a = dq all agree.
+.. math:: \tau = J_v'\, m\,(J_v \ddot q + \dot J_v \dot q_a)
+                 + J_\omega' \big(I (J_\omega \ddot q + \dot J_\omega \dot q_a) + \omega_a \times I \omega\big),
+          \qquad \omega_a = J_\omega \dot q_a.
+
+The last term vanishes in x'C x (there omega_a = J_omega x), and what is left of 2 x'C x is x'(dM/dt) x: the property
+holds for revolute and prismatic joints, since the recursion computes both derivatives exactly.
+
+This C is not the symmetric one of the Christoffel symbols, which has a moment of
+:math:`\tfrac12 \mathrm{tr}(I)\,\omega_a \times \omega` less per link. It therefore depends on which bodies are
+taken together (here, as published, all that a joint moves as one link); for dq_a = dq all agree.
 """
 
 from dataclasses import dataclass
@@ -33,7 +37,8 @@ class StarMotion:
     Attributes
     ----------
     omega, omega_a : angular velocity from dq and from dq_a
-    alpha, acc : J ddq + dJ/dt dq_a of the rotation and of the origin (minus free fall)
+    alpha : angular acceleration J ddq + dJ/dt dq_a, with J in the frame's own axes
+    acc : the same of the origin, with J in axes at rest; minus free fall
     """
 
     omega: Array

@@ -4,7 +4,7 @@ import numpy as np
 
 from modrob_cli.arrays import Array
 from modrob_cli.dynamics.body_terms import body_terms, joint_screws
-from modrob_cli.dynamics.link_motion import by_joint, joint_positions, link_motions
+from modrob_cli.dynamics.link_motion import base_motion, by_joint, joint_positions, link_motions
 from modrob_cli.model.robot import Robot
 
 PARAMETERS = ("m", "mc_x", "mc_y", "mc_z", "I_xx", "I_xy", "I_yy", "I_xz", "I_yz", "I_zz")
@@ -35,11 +35,11 @@ def regressor(robot: Robot, q: Array, dq: Array, ddq: Array) -> Array:
     q, dq, ddq = by_joint(robot, q, dq, ddq)
     n, count = q.shape
     positions = joint_positions(robot, q)
-    motions = link_motions(robot, positions, dq, ddq)
+    motions = link_motions(positions, dq, ddq, base_motion(robot, count))
     Y = np.zeros((count, n, len(PARAMETERS) * n))
     for i, screws in enumerate(joint_screws(positions)):
         for joint, screw in enumerate(screws):
             terms = body_terms(motions[i], screw)
             columns = np.concatenate([terms.y0[None], terms.y, terms.B[list(_ENTRY)] * _TIMES])
-            Y[:, joint, 10 * i : 10 * i + 10] = columns.T
+            Y[:, joint, len(columns) * i : len(columns) * (i + 1)] = columns.T
     return Y

@@ -7,7 +7,7 @@ are not exactly the width of the bounds, because a mass and its centre of mass a
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,9 +20,11 @@ from modrob_cli.dynamics.newton_euler import backward
 from modrob_cli.dynamics.quadratic_range import entry, quadratic_range
 from modrob_cli.dynamics.uncertain_body import UncertainBody, is_exact, trace_minus
 from modrob_cli.errors import ShapeError
+from modrob_cli.interval import Interval
 from modrob_cli.model.body import INERTIA_ENTRIES, PlacedBody, RigidBody
-from modrob_cli.model.joint import Joint
+from modrob_cli.model.joint import Friction
 from modrob_cli.model.robot import Robot
+from modrob_cli.model.uncertain import Uncertain
 
 NOISE = 1e-12
 """Shares up to this are rounding noise (a lever of 1e-17 m instead of 0) and left out."""
@@ -103,6 +105,27 @@ def acceleration_widths(robot: Robot, q: Array, tolerance: Array) -> list[Widths
     return widths
 
 
+def without_width(robot: Robot) -> Robot:
+    """The robot with every parameter at its nominal value, without bands and disturbance."""
+
+    def exact(value: Uncertain) -> Uncertain:
+        return Uncertain.exact(value.nominal)
+
+    def point(body: RigidBody) -> RigidBody:
+        return replace(body, mass=exact(body.mass), com=exact(body.com), inertia=exact(body.inertia))
+
+    joints = tuple(
+        replace(
+            joint,
+            friction=Friction(exact(joint.friction.viscous), exact(joint.friction.coulomb)),
+            drive=replace(joint.drive, rotor_inertia=exact(joint.drive.rotor_inertia)),
+        )
+        for joint in robot.joints
+    )
+    bodies = tuple(replace(placed, body=point(placed.body)) for placed in robot.bodies)
+    return replace(robot, joints=joints, bodies=bodies, disturbance=Interval(np.zeros(robot.dof)))
+
+
 def _labelled(robot: Robot) -> Iterator[tuple[str, PlacedBody]]:
     """Every body with a name of its own: where several share one, with its number in the list of bodies."""
     count = Counter(placed.body.name for placed in robot.bodies)
@@ -118,7 +141,7 @@ def _body_widths(body: RigidBody, terms: BodyTerms) -> Iterator[tuple[str, Array
     slope = np.stack([sum(entry(Q, k, m) * com[m] for m in range(3)) for k in range(3)])
     if not body.mass.is_exact:
         yield "mass", body.mass.interval.wid * np.abs(terms.y0 + com @ terms.y + com @ slope)
-    for k in np.flatnonzero(body.com.interval.wid):
+    for k in map(int, np.flatnonzero(body.com.interval.wid)):
         # About the middle of the interval: f(mid + x) - f(mid) = (y + 2 Q c) x + Q_kk x^2, with c at the middle.
         middle, reach = body.com.interval.mid, np.zeros(3)
         reach[k] = body.com.interval.rad[k]
@@ -126,7 +149,7 @@ def _body_widths(body: RigidBody, terms: BodyTerms) -> Iterator[tuple[str, Array
         b[k] = terms.y[k] + 2.0 * (slope[k] + entry(Q, k, k) * (middle[k] - com[k]))
         low, high = quadratic_range(b, Q, reach)
         yield f"com {'xyz'[k]}", mass * (high - low)
-    for k in np.flatnonzero(body.inertia.interval.wid):
+    for k in map(int, np.flatnonzero(body.inertia.interval.wid)):
         name = INERTIA_ENTRIES[k]
         times = 1.0 if name[0] == name[1] else 2.0  # an entry off the diagonal stands for two
         yield f"inertia {name}", body.inertia.interval.wid[k] * times * np.abs(terms.B[k])
@@ -134,7 +157,7 @@ def _body_widths(body: RigidBody, terms: BodyTerms) -> Iterator[tuple[str, Array
 
 def _drive_widths(robot: Robot, i: int, dq: Array, ddq: Array) -> Iterator[tuple[str, float]]:
     """Mean widths by friction, rotor and disturbance of joint i; states of shape (T,)."""
-    joint: Joint = robot.joints[i]
+    joint = robot.joints[i]
     friction, drive = joint.friction, joint.drive
     standing = np.abs(dq) <= friction.velocity_band
     parts = (

@@ -92,15 +92,15 @@ def yaml_files(folder: Path) -> Iterator[Path]:
                 yield Path(root) / name
 
 
-def read_assembly(path: Path, catalogue: Catalogue | None = None) -> LoadedAssembly:
-    """Read an assembly and the modules of its chain.
+def read_assembly(path: Path, catalogue: Catalogue | None = None, loaded: YamlDocument | None = None) -> LoadedAssembly:
+    """Read an assembly and the modules of its chain; ``loaded`` is its content where it has been loaded already.
 
     Raises
     ------
     InputFileError
         With all faults of the assembly, of its catalogue, and of the chain.
     """
-    document, loaded = read_document(path, AssemblyDocument)
+    document, loaded = read_document(path, AssemblyDocument, loaded)
     modules = _collect(document, loaded, path, catalogue or Catalogue())
     faults = list(_chain_faults(document, modules, loaded))
     if faults:

@@ -19,15 +19,17 @@ D = TypeVar("D", bound=Document)
 _SHOWN = 60
 
 
-def read_document(path: Path, kind: type[D]) -> tuple[D, YamlDocument]:
+def read_document(path: Path, kind: type[D], loaded: YamlDocument | None = None) -> tuple[D, YamlDocument]:
     """Read a document of one kind; returns it with the YAML it came from (for places of later faults).
+
+    ``loaded`` is the file's content where it has been loaded already.
 
     Raises
     ------
     InputFileError
         With all faults of the file.
     """
-    loaded = load_yaml(path)
+    loaded = loaded or load_yaml(path)
     document = check_document(loaded, expected=kind)
     if not isinstance(document, kind):
         raise TypeError(f"{type(document).__name__} is not {kind.__name__}")

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from modrob_cli.assembly.synthesis import synthesize
-from modrob_cli.errors import Fault, InputFileError
+from modrob_cli.errors import InputFileError
 from modrob_cli.io.catalogue import Catalogue, read_assembly
-from modrob_cli.io.documents import check_document, kind_of
+from modrob_cli.io.documents import kind_of, read_document
 from modrob_cli.io.yaml_loader import load_yaml
 from modrob_cli.model.robot import Robot
 from modrob_cli.schema import RobotDocument
@@ -37,12 +37,12 @@ def load_robot(path: Path, catalogue: Catalogue | None = None) -> LoadedRobot:
     loaded = load_yaml(path)
     kind = kind_of(loaded)
     if kind == "assembly/1":
-        found = read_assembly(path, catalogue)
-        return LoadedRobot(synthesize(found.assembly), found.files)
-    if kind == "module/1":
-        message = "found a module/1 document, expected a robot: an assembly/1, a robot/1 or a URDF file"
-        raise InputFileError(loaded.fault(("modrob",), message))
-    document = check_document(loaded, RobotDocument)
-    if not isinstance(document, RobotDocument):
-        raise InputFileError(Fault(str(path), "expected a robot"))
+        assembled = read_assembly(path, catalogue, loaded)
+        return LoadedRobot(synthesize(assembled.assembly), assembled.files)
+    if kind != "robot/1":
+        message = "expected a robot: an assembly/1 or a robot/1 document, or a URDF file"
+        if kind is None:
+            raise InputFileError(loaded.fault((), f"the key modrob is missing; {message}"))
+        raise InputFileError(loaded.fault(("modrob",), f"found {kind!r}, {message}"))
+    document, _ = read_document(path, RobotDocument, loaded)
     return LoadedRobot(document.to_model(), [path])

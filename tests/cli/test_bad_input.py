@@ -160,7 +160,7 @@ def test_folder_for_file(modrob: Modrob, workspace: Path) -> None:
 def test_module_for_robot(modrob: Modrob, workspace: Path) -> None:
     out = workspace / "out"
     result = modrob("assemble", workspace / "parts" / "L.yaml", "-o", out)
-    expect_refusal(result, out, "L.yaml", "found a module/1 document, expected a robot", "$.modrob", 1)
+    expect_refusal(result, out, "L.yaml", "found 'module/1', expected a robot", "$.modrob", 1)
 
 
 @pytest.mark.parametrize("command", ["check", "assemble"])

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -13,8 +14,8 @@ from modrob_cli.dynamics.exact_bounds import exact_bounds
 from modrob_cli.dynamics.width_share import acceleration_widths, parameter_widths, ranked
 from modrob_cli.errors import ShapeError
 from modrob_cli.interval import Interval
-from modrob_cli.model.body import INERTIA_ENTRIES, PlacedBody, RigidBody
-from modrob_cli.model.joint import Drive, Friction, Joint
+from modrob_cli.model.body import INERTIA_ENTRIES, InertiaPoint, PlacedBody, RigidBody
+from modrob_cli.model.joint import Drive, Friction, Joint, JointType
 from modrob_cli.model.robot import Robot
 from modrob_cli.model.uncertain import Uncertain
 from modrob_cli.spatial import rotation, translation
@@ -39,12 +40,12 @@ def some_robot(seed: int, kinds: str = "RPR") -> Robot:
         viscous, coulomb = spread(rng, np.array(3.0), 0.5), spread(rng, np.array(2.0), 0.4)
         friction = Friction(viscous, coulomb, coulomb_band=0.2, velocity_band=0.05)
         drive = Drive(spread(rng, np.array(1e-3), 1e-4), gear_ratio=50.0)
-        type_ = "revolute" if kind == "R" else "prismatic"
-        joints.append(Joint(f"j{i + 1}", type_, place, 0.0, friction, drive))  # type: ignore[arg-type]
-        for about in ("com", "frame"):
+        type_: JointType = "revolute" if kind == "R" else "prismatic"
+        joints.append(Joint(f"j{i + 1}", type_, place, 0.0, friction, drive))
+        for about in get_args(InertiaPoint):
             com = spread(rng, rng.uniform(-0.3, 0.3, size=3), 0.1)
             inertia = spread(rng, rng.uniform(0.0, 0.02, size=6), 0.01)
-            body = RigidBody(f"b{i}.{about}", spread(rng, np.array(2.0), 0.3), com, inertia, about)  # type: ignore[arg-type]
+            body = RigidBody(f"b{i}.{about}", spread(rng, np.array(2.0), 0.3), com, inertia, about)
             bodies.append(PlacedBody(i + 1, rotation("y", rng.uniform(-3, 3)) @ translation("x", 0.2), body))
     disturbance = Interval(np.full(len(kinds), -0.3), np.full(len(kinds), 0.4))
     gravity = np.array([1.0, -2.0, -9.0])
@@ -173,7 +174,7 @@ def test_acceleration_tolerance_alone() -> None:
     for k in (0, 2):
         alone = np.zeros(3)
         alone[k] = tolerance[k]
-        bounds = ddq_bounds(bare, *motion, alone)
+        bounds = ddq_bounds(bare, motion[0], motion[1], motion[2], alone)
         got = [joint[f"j{k + 1} acceleration tolerance"] for joint in widths]
         np.testing.assert_allclose(got, (bounds.upper - bounds.lower).mean(axis=0), rtol=1e-9, atol=1e-9)
     assert all(len(joint) == 2 for joint in widths)
