@@ -59,12 +59,33 @@ def body_function(robot: Robot, index: int, j: int, q: Array, dq: Array, ddq: Ar
     placed = robot.bodies[index]
     model = build_model(replace(robot, bodies=()))
     data = model.createData()
-    pin.forwardKinematics(model, data, q, dq, ddq)
-    model.addFrame(pin.Frame("body", placed.link, 0, pin.SE3(placed.pose), pin.FrameType.OP_FRAME))
-    data = model.createData()
-    pin.computeJointTorqueRegressor(model, data, q, dq, ddq)
     Y = pin.computeJointTorqueRegressor(model, data, q, dq, ddq)[j, 10 * (placed.link - 1) : 10 * placed.link]
     return np.array([_shifted(placed, unit) @ Y for unit in np.eye(10)])
+
+
+def many_torques(robot: Robot, q: Array, dq: Array, ddq: Array, rng: np.random.Generator, count: int) -> Array:
+    """Rigid-body torques (count, n) of random members, by Pinocchio's regressor; half of all values at an end."""
+
+    def draw(part: Uncertain) -> Array:
+        shape = (count, *part.nominal.shape)
+        share = rng.random(shape)
+        share = np.where(rng.random(shape) < 0.5, share.round(), share)
+        return np.asarray(part.interval.inf + share * (part.interval.sup - part.interval.inf))
+
+    tau = np.zeros((count, robot.dof))
+    for index, placed in enumerate(robot.bodies):
+        if placed.link == 0 or placed.body.is_massless:
+            continue
+        mass, com, inertia = draw(placed.body.mass), draw(placed.body.com), draw(placed.body.inertia)
+        xx, xy, xz, yy, yz, zz = inertia.T
+        if placed.body.inertia_about == "com":
+            x, y, z = com.T
+            xx, yy, zz = xx + mass * (y * y + z * z), yy + mass * (x * x + z * z), zz + mass * (x * x + y * y)
+            xy, xz, yz = xy - mass * x * y, xz - mass * x * z, yz - mass * y * z
+        phi = np.stack([mass, *(mass[:, None] * com).T, xx, xy, yy, xz, yz, zz], axis=1)
+        for j in range(placed.link):
+            tau[:, j] += phi @ body_function(robot, index, j, q, dq, ddq)
+    return tau
 
 
 def _shifted(placed: PlacedBody, parameters: Array) -> Array:
@@ -82,9 +103,7 @@ def _shifted(placed: PlacedBody, parameters: Array) -> Array:
     )
 
 
-def worst_parameters(
-    robot: Robot, j: int, q: Array, dq: Array, ddq: Array, sign: float, movable: set[int] | None = None
-) -> Parameters:
+def worst_parameters(robot: Robot, j: int, q: Array, dq: Array, ddq: Array, sign: float) -> Parameters:
     """The member that makes sign * torque of joint j largest, body by body, by enumerating the faces of each box."""
     out: Parameters = []
     for index, placed in enumerate(robot.bodies):

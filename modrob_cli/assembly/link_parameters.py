@@ -2,13 +2,12 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from modrob_cli.arrays import Array, frozen
+from modrob_cli.dynamics.link_inertia import joined
 from modrob_cli.interval import Interval
-from modrob_cli.model.body import PlacedBody, tensor, tensor_entries
+from modrob_cli.model.body import PlacedBody, tensor_entries
 from modrob_cli.model.robot import Robot
-from modrob_cli.spatial import invert, parallel_axis
+from modrob_cli.spatial import invert
 
 
 @dataclass(frozen=True)
@@ -54,26 +53,9 @@ def link_parameters(robot: Robot, frames: Array) -> LinkParameters:
 
     Composition in m, m c and I has no special case for massless parts; a link without mass gets com = 0.
     """
-    links = [_compose(bodies) for bodies in placed_in(robot, frames)]
+    links = [joined(bodies).central() for bodies in placed_in(robot, frames)]
     return LinkParameters(
         mass=frozen([mass for mass, _, _ in links], (robot.dof,)),
         com=frozen([com for _, com, _ in links], (robot.dof, 3)),
-        inertia_com=frozen([inertia for _, _, inertia in links], (robot.dof, 6)),
+        inertia_com=frozen([tensor_entries(inertia) for _, _, inertia in links], (robot.dof, 6)),
     )
-
-
-def _compose(bodies: list[PlacedBody]) -> tuple[float, Array, Array]:
-    """Mass, centre of mass and inertia about it, in the frame that the poses refer to."""
-    if not bodies:
-        return 0.0, np.zeros(3), np.zeros(6)
-    mass = np.array([placed.body.mass.nominal for placed in bodies])
-    R = np.stack([placed.pose[:3, :3] for placed in bodies])
-    c = np.stack([placed.body.com.nominal for placed in bodies])
-    r = np.einsum("bij,bj->bi", R, c) + np.stack([placed.pose[:3, 3] for placed in bodies])
-    total = float(mass.sum())
-    com = mass @ r / total if total > 0.0 else np.zeros(3)
-    own = np.stack([tensor(placed.body.inertia.nominal) for placed in bodies])
-    about_frame = np.array([placed.body.inertia_about == "frame" for placed in bodies])
-    own = own - (mass * about_frame)[:, None, None] * parallel_axis(c)
-    inertia = R @ own @ np.swapaxes(R, -1, -2) + mass[:, None, None] * parallel_axis(r - com)
-    return total, com, tensor_entries(inertia.sum(axis=0))

@@ -14,9 +14,9 @@ from modrob_cli.cli.options import DEFAULT_OUT, AsJson, OutDir, Overwrite, numbe
 _HELP = """Bound the joint torques along a motion, for every admissible value of every uncertain parameter.
 
 ROBOT is an assembly, a robot file or a URDF. MOTION is a CSV file t,q1..qN,dq1..dqN,ddq1..ddqN in joint order, or with
-q.NAME, dq.NAME, ddq.NAME for joints by name. The bounds are exact (no vector of parameters gives more, one gives as much)
-and hold in spite of rounding. Writes MOTION.bounds.csv, .bounds.json, .bounds.png, and MOTION.shares.csv: which parameter
-makes the bounds wide, the most useful one to measure better first.
+q.NAME, dq.NAME, ddq.NAME for joints by name. The bounds are exact (no admissible parameters give more, some give as
+much) and hold in spite of rounding. Writes MOTION.bounds.csv, .bounds.json, .bounds.png, and MOTION.shares.csv: which
+parameters make the bounds wide, so which to measure better first.
 """
 
 _EPILOG = "Example: modrob bounds assemblies/lwa4p-6-payload.yaml motion.csv --ddq-tolerance 0.1 -o out/bounds"
@@ -58,7 +58,8 @@ def _bounds(
     as_json: AsJson = False,
     overwrite: Overwrite = False,
 ) -> None:
-    from modrob_cli.workflows.bounds import BoundsOptions, bounds
+    from modrob_cli.workflows.bounds import bounds
+    from modrob_cli.workflows.bounds_method import BoundsOptions
 
     options = BoundsOptions(
         method.value,
@@ -102,7 +103,8 @@ def _say_result(result: dict[str, Any]) -> None:
         for part in joint["parameters"][:_SHOWN]
     ]
     if rows:
-        say("\n  where the width comes from: the range that each parameter alone gives, mean over the motion\n")
+        of = " (of the exact range)" if result["method"] == "ianea" else ""
+        say(f"\n  where the width comes from{of}: the range that each parameter alone gives, mean over the motion\n")
         say(table(("joint", "parameter", "width", "unit", "share"), rows))
     else:
         say("\n  nothing in the robot file is uncertain: the width is the allowance for rounding")

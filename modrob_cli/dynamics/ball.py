@@ -85,6 +85,13 @@ class Ball:
         size = np.abs(other.c) + other.r
         return Ball(c, np.abs(self.c) * other.r + self.r * size + EPS * np.abs(c))
 
+    def both(self, other: "Ball") -> "Ball":
+        """Ball around what two enclosures of the same members have in common."""
+        lower = np.maximum(self.c - self.reach, other.c - other.reach)
+        upper = np.minimum(self.c + self.reach, other.c + other.reach)
+        size = EPS * (np.abs(lower) + np.abs(upper))
+        return Ball.between(lower - size, upper + size)
+
     def twice(self) -> "Ball":
         """Exact double."""
         return Ball(2.0 * self.c, 2.0 * self.r)

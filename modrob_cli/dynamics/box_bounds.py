@@ -36,7 +36,7 @@ from modrob_cli.interval import Interval
 from modrob_cli.model.joint import Drive, Friction
 from modrob_cli.model.robot import Robot
 
-CHUNK = 2048
+CHUNK = 1024
 """Samples worked on at once; the derivatives need 36 n times as much memory as the states."""
 
 

@@ -46,6 +46,11 @@ class StateBox:
     dq: Ball
     ddq: Ball
 
+    @property
+    def middle(self) -> "StateBox":
+        """The midpoint alone."""
+        return StateBox(*(Ball.exact(x.c) for x in (self.q, self.dq, self.ddq)))
+
     def directions(self) -> list[tuple[int, int]]:
         """The variables that have any width: (joint, 0 for q, 1 for dq, 2 for ddq), from base to tip."""
         states = (self.q, self.dq, self.ddq)
@@ -118,6 +123,10 @@ def box_links(robot: Robot, box: StateBox) -> Iterator[BoxLink]:
     slopes = BoxMotion(_none(0, count), _none(0, count), _none(0, count))
     screws = BoxScrews(_none(0, count), _none(0, count))
     turns = BoxScrews(_none(0, 0, count), _none(0, 0, count))
+    reach = _half_widths(box)
+    none, still = np.zeros((0, count)), np.zeros(count)
+    lengths = _Lengths(still, still, np.full(count, np.linalg.norm(robot.gravity)), none, none)
+    middle = box_links(robot, box.middle) if active else iter(())
     for i, joint in enumerate(robot.joints):
         position = BoxPosition.of(joint, box.q[i])
         slopes = _next_slopes(motion, slopes, position, box.dq[i])
@@ -127,7 +136,66 @@ def box_links(robot: Robot, box: StateBox) -> Iterator[BoxLink]:
         turns = position.moved(turns)
         screws = _with_own(position.moved(screws), position.is_revolute)
         turns = _next_turns(turns, screws, 0 in kinds, position.is_revolute)
+        if active:
+            lengths = lengths.behind(joint, box.q[i], box.dq[i], box.ddq[i])
+            motion, screws = _narrowed(BoxLink(motion, slopes, screws, turns), lengths, next(middle), *reach)
         yield BoxLink(motion, slopes, screws, turns)
+
+
+def _half_widths(box: StateBox) -> tuple[Array, Array]:
+    """Half-widths of the variables of ``directions``, (K, T), and of those of them that are positions."""
+    states = (box.q, box.dq, box.ddq)
+    found = box.directions()
+    reach = np.array([states[kind].reach[i] for i, kind in found]).reshape(len(found), box.q.c.shape[1])
+    return reach, reach[[kind == 0 for _, kind in found]]
+
+
+@dataclass(frozen=True)
+class _Lengths:
+    """Bounds of the lengths of a link's vectors, which no turn changes: (T,), and (J, T) for the screws."""
+
+    omega: Array
+    alpha: Array
+    acc: Array
+    w: Array
+    v: Array
+
+    def behind(self, joint: Joint, q: Ball, dq: Ball, ddq: Ball) -> "_Lengths":
+        """Of the link behind a joint; the recursion of ``margin.torque_magnitude``."""
+        revolute = joint.type == "revolute"
+        arm = np.linalg.norm(joint.placement[:3, 3]) + (0.0 if revolute else q.mag)
+        speed, push, spin = dq.mag, ddq.mag, self.alpha + self.omega**2
+        omega, alpha, acc = self.omega, self.alpha, self.acc + spin * arm
+        if revolute:
+            omega, alpha = omega + speed, alpha + push + omega * speed
+        else:
+            acc = acc + push + 2.0 * omega * speed
+        own = np.full((1, len(speed)), 1.0 if revolute else 0.0)
+        w, v = np.concatenate([self.w, own]), np.concatenate([self.v + self.w * arm, 1.0 - own])
+        return _Lengths(omega, alpha, acc, w, v)
+
+
+def _narrowed(
+    link: BoxLink, lengths: _Lengths, middle: BoxLink, reach: Array, turn_reach: Array
+) -> tuple[BoxMotion, BoxScrews]:
+    """Motion and screws, cut with bounds of their lengths and with their mean-value forms.
+
+    Turning an enclosure from link to link makes it wider each time. The lengths stop that for large boxes; the values at
+    the midpoint -+ |derivatives| times half-widths are exact to first order for small ones.
+    """
+
+    def narrow(wide: Ball, length: Array, point: Ball, slopes: Ball, rad: Array) -> Ball:
+        size = np.abs(slopes.c) + slopes.r
+        mean_value = Ball(point.c, point.r + np.einsum("...kt,kt->...t", size, rad[: size.shape[-2]]))
+        return wide.both(mean_value).both(Ball(np.zeros_like(wide.c), np.broadcast_to(length, wide.c.shape)))
+
+    def all_of(name: str, parts: tuple[BoxMotion | BoxScrews, ...], rad: Array) -> Ball:
+        wide, point, slopes = (getattr(part, name) for part in parts)
+        return narrow(wide, getattr(lengths, name), point, slopes, rad)
+
+    motions, screws = (link.motion, middle.motion, link.slopes), (link.screws, middle.screws, link.turns)
+    motion = BoxMotion(*(all_of(name, motions, reach) for name in ("omega", "alpha", "acc")))
+    return motion, BoxScrews(*(all_of(name, screws, turn_reach) for name in ("w", "v")))
 
 
 def _next_motion(before: BoxMotion, position: BoxPosition, dq: Ball, ddq: Ball) -> BoxMotion:

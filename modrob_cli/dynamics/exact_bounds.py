@@ -105,8 +105,8 @@ class Prepared:
     def of(cls, robot: Robot) -> "Prepared":
         """Prepare a robot."""
         moving = [robot.bodies_of(i + 1) for i in range(robot.dof)]
-        nominal = [joined(list(bodies)) for bodies in moving]
-        known = [joined([placed for placed in bodies if is_exact(placed.body)]) for bodies in moving]
+        nominal = [joined(bodies) for bodies in moving]
+        known = [joined(placed for placed in bodies if is_exact(placed.body)) for bodies in moving]
         return cls(robot, nominal, known, uncertain_bodies(robot), drive_boxes(robot))
 
 

@@ -1,5 +1,6 @@
 """Bodies of a link joined into one set of linear parameters (m, m c, I about the link's origin)."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,8 +18,13 @@ class LinearParameters:
     moment: Array
     inertia: Array
 
+    def central(self) -> tuple[float, Array, Array]:
+        """Mass, centre of mass (3,) and tensor about it (3, 3); a centre of mass of zero where there is no mass."""
+        com = self.moment / self.mass if self.mass > 0.0 else np.zeros(3)
+        return self.mass, com, self.inertia - self.mass * parallel_axis(com)
 
-def joined(bodies: list[PlacedBody]) -> LinearParameters:
+
+def joined(bodies: Iterable[PlacedBody]) -> LinearParameters:
     """Nominal parameters of rigidly joined bodies; all zero for none. No division, so massless parts are fine."""
     mass, moment, inertia = 0.0, np.zeros(3), np.zeros((3, 3))
     for placed in bodies:

@@ -28,7 +28,7 @@ def rnea(robot: Robot, q: Array, dq: Array, ddq: Array) -> Array:
     q, dq, ddq = by_joint(robot, q, dq, ddq)
     positions = joint_positions(robot, q)
     motions = link_motions(positions, dq, ddq, base_motion(robot, q.shape[1]))
-    links = [joined(list(robot.bodies_of(i + 1))) for i in range(robot.dof)]
+    links = [joined(robot.bodies_of(i + 1)) for i in range(robot.dof)]
     return np.ascontiguousarray(backward(positions, motions, links).T)
 
 

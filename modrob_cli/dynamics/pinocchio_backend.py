@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from modrob_cli.arrays import Array
+from modrob_cli.dynamics.link_inertia import joined
 from modrob_cli.errors import ShapeError
-from modrob_cli.model.body import PlacedBody, tensor
 from modrob_cli.model.robot import Robot
-from modrob_cli.spatial import parallel_axis
 
 TOOL_FRAME = "modrob_tool"
 
@@ -33,31 +32,10 @@ def build_model(robot: Robot) -> Any:
         # The names carry the index, because Pinocchio wants them unique and the base is named "universe".
         model.addJoint(index, kind, pin.SE3(joint.zero_placement), f"{index + 1}:{joint.name}")
     for link in range(robot.dof + 1):
-        mass, com, inertia = _link_inertia(robot.bodies_of(link))
-        model.appendBodyToJoint(link, pin.Inertia(mass, com, inertia), pin.SE3.Identity())
+        inertia = pin.Inertia(*joined(robot.bodies_of(link)).central())
+        model.appendBodyToJoint(link, inertia, pin.SE3.Identity())
     model.addFrame(pin.Frame(TOOL_FRAME, robot.dof, 0, pin.SE3(robot.tool_transform), pin.FrameType.OP_FRAME))
     return model
-
-
-def _link_inertia(bodies: tuple[PlacedBody, ...]) -> tuple[float, Array, Array]:
-    """Mass, centre of mass and tensor about it of rigidly joined bodies, in the frame of their link.
-
-    Composed in the linear parameters (m, m c, I about the origin), where a massless body needs no division.
-    """
-    mass, moment, about_origin = 0.0, np.zeros(3), np.zeros((3, 3))
-    for placed in bodies:
-        R, p = placed.pose[:3, :3], placed.pose[:3, 3]
-        body = placed.body
-        m, c = float(body.mass.nominal), body.com.nominal
-        about_com = tensor(body.inertia.nominal)
-        if body.inertia_about == "frame":
-            about_com = about_com - m * parallel_axis(c)
-        c = R @ c + p
-        mass += m
-        moment += m * c
-        about_origin += R @ about_com @ R.T + m * parallel_axis(c)
-    com = moment / mass if mass > 0.0 else np.zeros(3)
-    return mass, com, about_origin - mass * parallel_axis(com)
 
 
 def inverse_dynamics(robot: Robot, q: Array, dq: Array, ddq: Array) -> Array:

@@ -41,10 +41,8 @@ class Interval:
     def __init__(self, inf: ArrayLike, sup: ArrayLike | None = None) -> None:
         lower = np.asarray(inf, dtype=float)
         upper = lower if sup is None else np.asarray(sup, dtype=float)
-        try:
-            lower, upper = np.broadcast_arrays(lower, upper)
-        except ValueError as error:
-            raise ShapeError(f"interval end points of shapes {lower.shape} and {upper.shape}") from error
+        if lower.shape != upper.shape:
+            lower, upper = _broadcast(lower, upper)
         if not np.all((lower <= upper) & (lower < np.inf) & (upper > -np.inf)):  # also false for NaN
             raise NumericalError("an interval needs inf <= sup, no NaN, and a real number in it")
         lower, upper = lower.copy(), upper.copy()
@@ -210,6 +208,14 @@ class Interval:
     def __repr__(self) -> str:
         """Show both ends."""
         return f"Interval({self.inf.tolist()!r}, {self.sup.tolist()!r})"
+
+
+def _broadcast(lower: Array, upper: Array) -> tuple[Array, Array]:
+    try:
+        lower, upper = np.broadcast_arrays(lower, upper)
+    except ValueError as error:
+        raise ShapeError(f"interval end points of shapes {lower.shape} and {upper.shape}") from error
+    return lower, upper
 
 
 def _over_ends(a: Interval, b: Interval, operation: Pairwise) -> Interval:

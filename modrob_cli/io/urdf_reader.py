@@ -1,6 +1,7 @@
 """URDF in: a serial arm as :class:`Robot`. Pinocchio does the parsing, after the text has passed our own checks."""
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,17 +11,17 @@ from modrob_cli.arrays import Array
 from modrob_cli.errors import Fault, InputFileError
 from modrob_cli.interval import Interval
 from modrob_cli.io.urdf_chain import serial_chain
+from modrob_cli.io.urdf_writer import NO_LIMIT
 from modrob_cli.io.urdf_xml import XmlJoint, numbers, scan
 from modrob_cli.io.yaml_loader import read_text
 from modrob_cli.model.body import PlacedBody, RigidBody, tensor_entries
 from modrob_cli.model.joint import Friction, Joint, Limits, Range
 from modrob_cli.model.robot import STANDARD_GRAVITY, Robot
 from modrob_cli.model.uncertain import Uncertain
+from modrob_cli.schema.base import JOINT_NAME
 from modrob_cli.spatial import invert
 
 MAX_BYTES = 16 * 2**20
-NO_LIMIT = 1e300
-"""Limits of this size or more mean none (some tools write the largest double)."""
 
 
 def read_urdf(path: Path) -> Robot:
@@ -38,6 +39,7 @@ def read_urdf(path: Path) -> Robot:
     text = read_text(path, MAX_BYTES)
     xml = scan(text, str(path))
     chain, tip = serial_chain(xml)
+    _check_names(chain, str(path))
     model = _parse(text, str(path))
     turns = [np.eye(4), *(_turn_to_z(_axis(joint)) for joint in chain)]
     joints, bodies = [], []
@@ -50,7 +52,22 @@ def read_urdf(path: Path) -> Robot:
             bodies.append(PlacedBody(index, invert(turns[index]), body))
     tool = invert(turns[-1]) @ model.frames[model.getBodyId(tip)].placement.homogeneous
     disturbance = Interval(np.zeros(len(chain)))
-    return Robot(xml.name, tuple(joints), tuple(bodies), tool, np.asarray(STANDARD_GRAVITY), disturbance)
+    return Robot(file_name(xml.name), tuple(joints), tuple(bodies), tool, np.asarray(STANDARD_GRAVITY), disturbance)
+
+
+def file_name(name: str) -> str:
+    """A robot's name as modrob's own documents and file names allow it: other characters become ``_``."""
+    return re.sub(r"^[^A-Za-z0-9]+|[^A-Za-z0-9_+-]", "_", name).lstrip("_")[:64] or "robot"
+
+
+def _check_names(chain: list[XmlJoint], file: str) -> None:
+    """Joint names are kept as they are, because logs use them; so they have to be usable in tables and files."""
+    message = "found a name that is not letters, digits, _ . # / + - and spaces (at most 128); rename the joint"
+    faults = [
+        Fault(file, f"joint {j.name!a}: {message}", line=j.line) for j in chain if not re.match(JOINT_NAME, j.name)
+    ]
+    if faults:
+        raise InputFileError(faults)
 
 
 def _parse(text: str, file: str) -> Any:

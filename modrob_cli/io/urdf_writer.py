@@ -11,7 +11,8 @@ from modrob_cli.model.robot import Robot
 from modrob_cli.spatial import to_xyz_rpy
 
 NO_LIMIT = 1e9
-"""Written where no limit is known: URDF asks for numbers, and a ``continuous`` joint is read as two coordinates."""
+"""Written where no limit is known: URDF asks for numbers, and a ``continuous`` joint is read as two coordinates.
+Read back, a limit of this size or more (some tools write the largest double) means none."""
 
 _RADIUS = 0.03
 

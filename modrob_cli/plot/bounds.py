@@ -9,7 +9,7 @@ import numpy as np
 from modrob_cli.arrays import Array
 from modrob_cli.plot.envelope import Band, Envelope
 
-NOMINAL, BAND, LIMIT, BEYOND = "#0b57d0", "#a8c7fa", "#b3261e", "#f28b82"
+NOMINAL, BAND, LIMIT, BEYOND = "#0b57d0", "#9ec0f7", "#b3261e", "#e8453c"
 MAX_RUNS = 1500
 """More runs of samples than the picture has pixels would not show."""
 LIMIT_IN_VIEW = 0.5
@@ -18,13 +18,14 @@ LIMIT_IN_VIEW = 0.5
 
 @dataclass(frozen=True)
 class BoundsLabels:
-    """Words of the picture, and torque limits (lower, upper) where known; the last four per joint."""
+    """Words of the picture, and torque limits (lower, upper) where known; the last five per joint."""
 
     title: str
     subtitle: str
     names: tuple[str, ...]
     units: tuple[str, ...]
-    captions: tuple[str, ...]
+    widths: tuple[str, ...]
+    limit_notes: tuple[str, ...]
     limits: tuple[tuple[float, float] | None, ...]
 
 
@@ -57,11 +58,13 @@ class BoundsCurves:
             right.axhline(0.0, color=NOMINAL, linewidth=1.0)
             # Names come from files: $ would start a formula. With y given, Matplotlib skips a slow search for a place.
             left.set_title(_plain(labels.names[j]), loc="left", y=1.0, fontsize=10, fontweight="bold")
-            right.set_title(_plain(labels.captions[j]), loc="right", y=1.0, fontsize=9)
+            left.set_title(_plain(labels.limit_notes[j]), loc="right", y=1.0, fontsize=9)
+            right.set_title(_plain(labels.widths[j]), loc="right", y=1.0, fontsize=9)
             for axis in (left, right):
                 _style(axis, t)
         for axis in axes[-1]:
             axis.set_xlabel("time [s]")
+        figure.align_ylabels(axes[:, 0])
         _head(figure, labels, height)
         figure.savefig(path, format="png", metadata={"Software": None})
 

@@ -17,6 +17,8 @@ class Document(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
+JOINT_NAME = r"^[A-Za-z0-9_][A-Za-z0-9_.#/+ -]{0,127}$"
+
 Name = Annotated[
     str,
     StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_+-]{0,63}$"),
@@ -26,7 +28,7 @@ Name = Annotated[
 
 JointName = Annotated[
     str,
-    StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.#/+ -]{0,127}$"),
+    StringConstraints(pattern=JOINT_NAME),
     Field(description="letters, digits, _ . # / + - and spaces, at most 128"),
 ]
 

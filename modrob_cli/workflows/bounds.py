@@ -70,10 +70,11 @@ def bounds(
         folder.claim(list(names.values()))
         with NumberCsv(folder.stage(names["bounds"]), _header(robot)) as table:
             for piece in reader:
-                found = compute(piece)
+                with np.errstate(over="ignore", invalid="ignore"):  # of absurd values; what is not finite is refused
+                    found = compute(piece)
                 table.write(_rows(piece.t, found))
-                for taker in (watch, thinned):
-                    taker.add(piece)
+                watch.add(piece)
+                thinned.add(piece)
                 summary.add(piece.t, found)
                 curves.add(piece.t, found.nominal, found.lower, found.upper)
                 report(reader.done)

@@ -66,7 +66,6 @@ class Summary:
     def labels(self, motion: str, options: BoundsOptions) -> BoundsLabels:
         """Words of the picture."""
         figures = self.to_json(options)
-        captions = tuple(_caption(joint, self.samples) for joint in figures["joints"])
         method = "exact range" if options.method == "exact" else "published interval algorithm (IANEA*)"
         given = (("ddq", options.ddq_tolerance), ("q", options.q_noise), ("dq", options.dq_noise))
         more = [f"{name} +- {', '.join(f'{value:g}' for value in values)}" for name, values in given if values]
@@ -76,19 +75,22 @@ class Summary:
             subtitle,
             self.robot.joint_names,
             tuple(joint["unit"] for joint in figures["joints"]),
-            captions,
+            tuple(_width_note(joint) for joint in figures["joints"]),
+            tuple(_limit_note(joint, self.samples) for joint in figures["joints"]),
             tuple(joint.limits.torque for joint in self.robot.joints),
         )
 
 
-def _caption(joint: dict[str, Any], samples: int) -> str:
-    text = f"width: mean {joint['mean_width']:.3g}, max {joint['max_width']:.3g} {joint['unit']}"
-    limits = joint["torque_limits"]
-    if limits:
-        text += f"; limits {limits[0]:.3g} .. {limits[1]:.3g}"
-    if joint["samples_beyond_limits"]:
-        text += f", beyond in {joint['samples_beyond_limits'] / samples:.1%} of the samples"
-    return text
+def _width_note(joint: dict[str, Any]) -> str:
+    return f"width: mean {joint['mean_width']:.3g}, max {joint['max_width']:.3g} {joint['unit']}"
+
+
+def _limit_note(joint: dict[str, Any], samples: int) -> str:
+    limits, beyond = joint["torque_limits"], joint["samples_beyond_limits"]
+    if not limits:
+        return ""
+    text = f"limits {limits[0]:.3g} .. {limits[1]:.3g} {joint['unit']}"
+    return f"{text}, beyond in {100.0 * beyond / samples:.2g} % of the samples" if beyond else text
 
 
 def share_json(robot: Robot, i: int, ranking: list[WidthShare]) -> dict[str, Any]:
@@ -113,8 +115,8 @@ def warning_json(robot: Robot, excess: Excess, samples: int) -> dict[str, Any]:
     revolute = robot.joints[robot.joint_names.index(excess.joint)].type == "revolute"
     name = _UNITS[excess.quantity] if revolute else _UNITS[excess.quantity].replace("rad", "m")
     low, high = excess.limit
-    message = (
-        f"{excess.joint}: {excess.quantity} outside {low:.5g} .. {high:.5g} {name} in {excess.count} of {samples} "
-        f"samples, first at t = {excess.first_time:.6g} s, most at t = {excess.worst_time:.6g} s: by {excess.worst:.3g} {name}"
-    )
+    what = f"{excess.joint}: {excess.quantity} outside {low:.5g} .. {high:.5g} {name}"
+    first = f"in {excess.count} of {samples} samples, first at t = {excess.first_time:.6g} s"
+    worst = f"worst at t = {excess.worst_time:.6g} s: {excess.worst:.3g} {name} outside"
+    message = f"{what} {first}; {worst}"
     return {**asdict(excess), "limit": list(excess.limit), "unit": name, "message": message}

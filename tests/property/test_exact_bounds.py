@@ -25,7 +25,7 @@ from modrob_cli.model.joint import Drive, Friction
 from modrob_cli.model.robot import Robot
 from modrob_cli.model.uncertain import Uncertain
 from modrob_cli.workflows.robots import load_robot
-from tests.box_members import random_parameters, rigid_torque, with_parameters, worst_parameters
+from tests.box_members import many_torques, random_parameters, rigid_torque, with_parameters, worst_parameters
 from tests.high_precision import nominal_parameters, rigid_torques
 from tests.random_chains import random_chain
 
@@ -61,6 +61,18 @@ def test_no_member_is_outside(name: str) -> None:
             # Pinocchio's own rounding: a relative 1e-13 of torques up to some 100 N m
             assert np.all(tau >= bounds.lower[k] - 1e-11)
             assert np.all(tau <= bounds.upper[k] + 1e-11)
+
+
+@pytest.mark.parametrize("name", UNCERTAIN)
+def test_no_member_of_a_thousand_per_state_is_outside(name: str) -> None:
+    robot = without_drives(shipped(name))
+    rng = np.random.default_rng(101)
+    q, dq, ddq = states(robot, 102)
+    bounds = exact_bounds(robot, q, dq, ddq)
+    for k in range(STATES):
+        tau = many_torques(robot, q[k], dq[k], ddq[k], rng, 1000)
+        assert np.all(tau >= bounds.lower[k] - 1e-11)
+        assert np.all(tau <= bounds.upper[k] + 1e-11)
 
 
 @pytest.mark.parametrize("name", UNCERTAIN)

@@ -1,5 +1,6 @@
 """URDF in: equal to Pinocchio's own reading of the same text; bad files end in clear errors."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -193,3 +194,15 @@ def test_missing_file_folder_and_oversized_file(tmp_path: Path) -> None:
     big.write_bytes(b" " * (17 * 2**20))
     with pytest.raises(InputFileError, match="at most 16 MiB"):
         read_urdf(big)
+
+
+def test_a_robot_name_with_a_path_or_markup_becomes_a_file_name(tmp_path: Path) -> None:
+    text = urdf(link("base"), joint("j1", "base", "tip"), link("tip"))
+    for given, expected in (("../../x", "x"), ("my robot", "my_robot"), ("a&lt;b&gt;", "a_b_"), ("///", "robot")):
+        assert read(tmp_path, re.sub(r'<robot name="[^"]*"', f'<robot name="{given}"', text)).name == expected
+
+
+def test_joint_names_that_tables_cannot_hold_are_refused(tmp_path: Path) -> None:
+    message = refusal(tmp_path, urdf(link("base"), joint("a, =1+1", "base", "tip"), link("tip")))
+    assert "rename the joint" in message
+    assert "=1+1" in message

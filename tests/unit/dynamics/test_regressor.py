@@ -23,7 +23,7 @@ def test_equals_pinocchio(seed: int) -> None:
     Y = regressor(robot, q, dq, ddq)
     assert Y.shape == (4, robot.dof, len(PARAMETERS) * robot.dof)
     for k in range(4):
-        expected = pin.computeJointTorqueRegressor(model, data, q[k], dq[k], ddq[k])
+        expected = np.atleast_2d(pin.computeJointTorqueRegressor(model, data, q[k], dq[k], ddq[k]))  # (10,) for n = 1
         np.testing.assert_allclose(Y[k], expected, rtol=1e-10, atol=1e-10 * np.abs(expected).max())
 
 
