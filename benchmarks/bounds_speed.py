@@ -1,8 +1,9 @@
 """Speed of the torque bounds on one thread: ``python -m benchmarks.bounds_speed [--samples 100000]``.
 
-Machines differ and are shared: compare the ratios to a Python loop over ``pin.rnea`` on the same samples in the same
-run. Each figure is the median of five runs; the runs of all cases are interleaved, so that a busy minute hits them all.
-The work is done in a process of its own, with the thread pools of BLAS and OpenMP set to one thread.
+Machines differ and are shared: compare the ratios to a Python loop over ``pin.rnea`` that keeps its results, on the
+same samples in the same run. Each figure is the median of five runs, in CPU time; the runs of all cases of a table are
+interleaved, so that a busy minute hits them all. The work is done in a process of its own, with the thread pools of
+BLAS and OpenMP set to one thread.
 """
 
 import argparse
@@ -13,15 +14,15 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
 from benchmarks.bounds_width import ASSEMBLIES, link_boxes, widened
+from modrob_cli.arrays import Array
 from modrob_cli.dynamics.exact_bounds import exact_bounds
 from modrob_cli.dynamics.ianea import ianea
 from modrob_cli.dynamics.newton_euler import rnea
-from modrob_cli.dynamics.pinocchio_backend import inverse_dynamics
+from modrob_cli.dynamics.pinocchio_backend import build_model
 from modrob_cli.interval import Interval
 from modrob_cli.model.body import PlacedBody, RigidBody
 from modrob_cli.model.joint import Joint
@@ -32,19 +33,36 @@ from modrob_cli.workflows.robots import load_robot
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 RUNS = 5
+JOINTS = (2, 4, 8, 16, 32)
 Case = Callable[[], object]
+States = tuple[Array, Array, Array]
 
 
 def medians(cases: dict[str, Case]) -> dict[str, float]:
-    """Median seconds of each case over interleaved runs, after one warm-up."""
+    """Median CPU seconds of each case over interleaved runs, after one warm-up."""
     seconds: dict[str, list[float]] = {name: [] for name in cases}
     for k in range(RUNS + 1):
         for name, case in cases.items():
-            start = time.perf_counter()
+            start = time.process_time()
             case()
             if k:
-                seconds[name].append(time.perf_counter() - start)
+                seconds[name].append(time.process_time() - start)
     return {name: statistics.median(found) for name, found in seconds.items()}
+
+
+def random_states(samples: int, dof: int) -> States:
+    """Random q, dq, ddq within +-2, shape (samples, dof) each."""
+    q, dq, ddq = np.random.default_rng(1).uniform(-2.0, 2.0, (3, samples, dof))
+    return q, dq, ddq
+
+
+def pinocchio_loop(robot: Robot, states: States) -> Case:
+    """The reference: nominal torques, sample by sample."""
+    import pinocchio as pin
+
+    model = build_model(robot)
+    data = model.createData()
+    return lambda: [pin.rnea(model, data, *sample) for sample in zip(*states, strict=True)]
 
 
 def chain(dof: int) -> Robot:
@@ -68,12 +86,12 @@ def last_link_only(robot: Robot) -> Robot:
 def compare(samples: int) -> None:
     """All methods on the 6-axis arm."""
     arm, modules = (load_robot(ASSEMBLIES / f"{name}.yaml").robot for name in ("lwa4p-table34", "lwa4p-6-tol5"))
-    x = tuple(np.random.default_rng(1).uniform(-2.0, 2.0, (3, samples, arm.dof)))
+    x = random_states(samples, arm.dof)
     last, every = link_boxes(arm), link_boxes(modules)
     reference = "pin.rnea in a Python loop"
     found = medians(
         {
-            reference: lambda: inverse_dynamics(arm, *x),
+            reference: pinocchio_loop(arm, x),
             "rnea": lambda: rnea(arm, *x),
             "exact bounds, uncertain last link": lambda: exact_bounds(arm, *x),
             "exact bounds, 15 modules with +-5 % each": lambda: exact_bounds(modules, *x),
@@ -87,42 +105,45 @@ def compare(samples: int) -> None:
 
 
 def over_joints(samples: int) -> None:
-    """Cost over the number of joints, and the slope of it in the logarithm."""
-    names = ("pin loop", "exact, last", "exact, all", "IANEA*, all")
+    """Cost over the number of joints, and the exponent of its growth."""
+    cases: dict[str, Case] = {}
+    for dof in JOINTS:
+        cases |= {f"{dof} {name}": case for name, case in _chain_cases(chain(dof), samples).items()}
+    found = np.reshape(list(medians(cases).values()), (len(JOINTS), -1)) * 1e6 / samples
+    names = [name.partition(" ")[2] for name in cases][: found.shape[1]]
     print(f"\n{f'us/sample, {samples} samples':26}" + "".join(f"{name:>14}" for name in names))
-    rows: dict[int, list[float]] = {}
-    for dof in (2, 4, 8, 16, 32):
-        robot = chain(dof)
-        rows[dof] = [1e6 * seconds / samples for seconds in _chain_times(robot, samples, names)]
-        print(f"{dof:3d} joints" + " " * 16 + "".join(f"{value:14.2f}" for value in rows[dof]))
-    for first, second in list(pairwise(rows))[-2:]:
-        slopes = np.log2(np.array(rows[second]) / np.array(rows[first])) / np.log2(second / first)
-        print(f"exponent, {first:2d} to {second:2d} joints  " + "".join(f"{slope:14.2f}" for slope in slopes))
+    for dof, row in zip(JOINTS, found, strict=True):
+        print(f"{f'{dof:3d} joints':26}" + "".join(f"{value:14.2f}" for value in row))
+    for k, dof in enumerate(JOINTS[:-1]):
+        slopes = np.log(found[k + 1] / found[k]) / np.log(JOINTS[k + 1] / dof)
+        print(f"{f'exponent, {dof} to {JOINTS[k + 1]} joints':26}" + "".join(f"{slope:14.2f}" for slope in slopes))
 
 
-def _chain_times(robot: Robot, samples: int, names: tuple[str, ...]) -> list[float]:
-    x = tuple(np.random.default_rng(2).uniform(-2.0, 2.0, (3, samples, robot.dof)))
+def _chain_cases(robot: Robot, samples: int) -> dict[str, Case]:
+    x = random_states(samples, robot.dof)
     last, links = last_link_only(robot), link_boxes(robot, np.tile(np.eye(4), (robot.dof, 1, 1)))
-    cases: tuple[Case, ...] = (
-        lambda: inverse_dynamics(robot, *x),
-        lambda: exact_bounds(last, *x),
-        lambda: exact_bounds(robot, *x),
-        lambda: ianea(robot, *x, links),
-    )
-    return list(medians(dict(zip(names, cases, strict=True))).values())
+    return {
+        "pin loop": pinocchio_loop(robot, x),
+        "exact, last": lambda: exact_bounds(last, *x),
+        "exact, all": lambda: exact_bounds(robot, *x),
+        "IANEA*, all": lambda: ianea(robot, *x, links),
+    }
 
 
 def over_samples(most: int) -> None:
     """Time per sample over the number of samples."""
     arm = load_robot(ASSEMBLIES / "lwa4p-table34.yaml").robot
-    links = link_boxes(arm)
     print(f"\n{'us/sample, uncertain last link':30}{'exact':>10}{'IANEA*':>10}")
     count = 1
     while count <= most:
-        x = tuple(np.random.default_rng(3).uniform(-2.0, 2.0, (3, count, arm.dof)))
-        found = medians({"exact": lambda x=x: exact_bounds(arm, *x), "ianea": lambda x=x: ianea(arm, *x, links)})  # type: ignore[misc]
+        found = medians(_two_bounds(arm, random_states(count, arm.dof)))
         print(f"{count:10d} samples{'':12}" + "".join(f"{1e6 * seconds / count:10.2f}" for seconds in found.values()))
         count *= 10
+
+
+def _two_bounds(robot: Robot, x: States) -> dict[str, Case]:
+    links = link_boxes(robot)
+    return {"exact": lambda: exact_bounds(robot, *x), "IANEA*": lambda: ianea(robot, *x, links)}
 
 
 def main() -> None:

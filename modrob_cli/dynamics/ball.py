@@ -99,10 +99,8 @@ class Ball:
 
 def stack(parts: Sequence[Ball], axis: int = 0) -> Ball:
     """Join balls along a new axis."""
-    shapes = np.broadcast_shapes(*(part.c.shape for part in parts))
-    centres, radii = (
-        [np.broadcast_to(x, shapes) for x in side] for side in zip(*((b.c, b.r) for b in parts), strict=True)
-    )
+    shape = np.broadcast_shapes(*(ball.c.shape for ball in parts))
+    centres, radii = ([np.broadcast_to(getattr(ball, name), shape) for ball in parts] for name in ("c", "r"))
     return Ball(np.stack(centres, axis), np.stack(radii, axis))
 
 
@@ -164,15 +162,13 @@ def cos_sin(q: Ball) -> tuple[Ball, Ball]:
     so where cos c >= cos r. Every end is computed to below 16 u, ``EPS`` covers it.
     """
     cos, sin, r = np.cos(q.c), np.sin(q.c), np.minimum(q.reach, np.pi)
-    cos_r, sin_r = np.cos(r), np.sin(r)
-    full = q.reach >= np.pi
-    return _range(cos, -sin, cos_r, sin_r, full), _range(sin, cos, cos_r, sin_r, full)
+    return _wave_range(cos, -sin, r), _wave_range(sin, cos, r)
 
 
-def _range(value: Array, slope: Array, cos_r: Array, sin_r: Array, full: Array) -> Ball:
-    """Range of a wave with this value and slope at the centre."""
-    middle, swing = value * cos_r, np.abs(slope * sin_r)
-    upper = np.where(full | (value >= cos_r - EPS), 1.0, np.minimum(middle + swing, 1.0))
-    lower = np.where(full | (-value >= cos_r - EPS), -1.0, np.maximum(middle - swing, -1.0))
+def _wave_range(value: Array, slope: Array, r: Array) -> Ball:
+    """Range over -r..r of a wave with this value and slope at 0; r = pi stands for anything wider, too."""
+    middle, swing, least = value * np.cos(r), np.abs(slope * np.sin(r)), np.cos(r) - EPS
+    upper = np.where(value >= least, 1.0, np.minimum(middle + swing, 1.0))
+    lower = np.where(-value >= least, -1.0, np.maximum(middle - swing, -1.0))
     ball = Ball.between(lower, upper)
     return Ball(ball.c, ball.r + EPS)

@@ -3,18 +3,18 @@ r"""Torque bounds over boxes of joint positions, velocities and accelerations: s
 Result: bounds of the torque for all states of the box and all admissible parameters (see docs/box-bounds.md). The
 rigid bodies' part is the least of three bounds, per sample and joint (upper bound; the lower one mirrors it):
 
-1. **Mean value.** Parameters that the torque is monotone in are fixed at their worse ends (``box_parameters``), and so are
-   the joint variables whose derivative, over the box and these parameters, has one sign. With x* these ends, and the
-   box's midpoint in the other variables, the mean-value theorem along the segment from x*, for each parameter vector,
-   gives: exact upper bound at x*, plus the sum of max |derivative| times half-width over the other variables.
+1. **Mean value.** Parameters that the torque is monotone in are fixed at their worse ends (``box_parameters``), and
+   so are the joint variables whose derivative, over the box and these parameters, has one sign. With x* these ends,
+   and the box's midpoint in the other variables, the mean-value theorem along the segment from x*, for each parameter
+   vector, gives: exact upper bound at x*, plus the sum of max |derivative| times half-width over the other variables.
 2. **Natural extension**: the torque evaluated with balls.
 3. **A priori**: the bound S of absolute values from :mod:`modrob_cli.dynamics.margin`; it does not depend on angles.
 
 Friction, rotor and disturbance are added exactly: each is monotone in dq or ddq, so its range over the box is
 between its ranges at the box's ends.
 
-Rounding: the ends of the box are doubles that enclose midpoint -+ radius; exact_bounds covers its own rounding, balls theirs
-(:mod:`modrob_cli.dynamics.ball`); the few operations here are covered by ``EPS`` times the sum of absolute values.
+Rounding: the ends of the box are doubles that enclose midpoint -+ radius; exact_bounds covers its own rounding, balls
+theirs (:mod:`modrob_cli.dynamics.ball`); the few operations here are covered by ``EPS`` times absolute values.
 """
 
 from collections.abc import Iterator
@@ -81,11 +81,8 @@ def box_bounds(
     NumericalError
         If a half-width is negative or not finite, or a result is not finite.
     """
-    parts = list(box_bounds_by_chunk(robot, q, dq, ddq, q_rad, dq_rad, ddq_rad))
-    if not parts:
-        return TorqueBounds(*(np.empty((0, robot.dof)) for _ in range(3)))
-    names = ("nominal", "lower", "upper")
-    return TorqueBounds(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    parts = box_bounds_by_chunk(robot, q, dq, ddq, q_rad, dq_rad, ddq_rad)
+    return TorqueBounds.joined([TorqueBounds.empty(robot.dof), *parts])
 
 
 def box_bounds_by_chunk(

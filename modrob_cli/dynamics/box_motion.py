@@ -180,8 +180,8 @@ def _narrowed(
 ) -> tuple[BoxMotion, BoxScrews]:
     """Motion and screws, cut with bounds of their lengths and with their mean-value forms.
 
-    Turning an enclosure from link to link makes it wider each time. The lengths stop that for large boxes; the values at
-    the midpoint -+ |derivatives| times half-widths are exact to first order for small ones.
+    Turning an enclosure from link to link makes it wider each time. The lengths stop that for large boxes; the values
+    at the midpoint -+ |derivatives| times half-widths are exact to first order for small ones.
     """
 
     def narrow(wide: Ball, length: Array, point: Ball, slopes: Ball, rad: Array) -> Ball:

@@ -33,18 +33,23 @@ SIDES = np.array([-1.0, 1.0])
 
 @dataclass(frozen=True)
 class BoxParameters:
-    """Linear parameters of a link in its frame: mass, first moment (3, ...), six tensor entries (6, ...).
+    """Parameters of one or more bodies in the link's frame, referred to a point of the link.
 
-    The other axes are (J, S, T): joint, side, sample; or of length one.
+    The axes after the component are (J, S, T), joint, side, sample, or of length one. A body with its tensor about the
+    centre of mass is referred to that (a ball), others to their frame's origin. That way the uncertain lever of the
+    centre of mass enters as few products as possible.
+
+    Attributes
+    ----------
+    mass : (...);  inertia : tensor about the point, (6, ...)
+    point : (3, ...), None for the link's origin
+    moment : mass times the centre of mass from the point, (3, ...), None for zero
     """
 
     mass: Ball
-    moment: Ball
     inertia: Ball
-
-    def __add__(self, other: "BoxParameters") -> "BoxParameters":
-        """Bodies joined."""
-        return BoxParameters(self.mass + other.mass, self.moment + other.moment, self.inertia + other.inertia)
+    point: Ball | None
+    moment: Ball | None
 
 
 @dataclass(frozen=True)
@@ -85,33 +90,43 @@ def sum_of(parts: Iterable[Ball]) -> Ball:
     return first
 
 
-def link_parameters(robot: Robot, index: int, link: BoxLink) -> BoxParameters | None:
-    """Worst-case parameters of the link behind joint ``index``, None for a link without bodies."""
+def link_parameters(robot: Robot, index: int, link: BoxLink) -> list[BoxParameters]:
+    """Worst-case parameters behind joint ``index``: one set for all known bodies, one for each uncertain body."""
     bodies = robot.bodies_of(index + 1)
-    if not bodies:
-        return None
-    terms = None if all(is_exact(placed.body) for placed in bodies) else BoxTerms.of(link)
-    total: BoxParameters | None = None
-    for placed in bodies:
-        part = _body_parameters(placed, terms)
-        total = part if total is None else total + part
-    return total
+    known = [_at_origin(placed) for placed in bodies if is_exact(placed.body)]
+    uncertain = [placed for placed in bodies if not is_exact(placed.body)]
+    found = [_joined(known)] if known else []
+    if uncertain:
+        terms = BoxTerms.of(link)
+        found += [_reduced(placed, terms) for placed in uncertain]
+    return found
 
 
-def _body_parameters(placed: PlacedBody, terms: BoxTerms | None) -> BoxParameters:
-    """One body's parameters, in the link's frame, each range reduced to its worst end where that is certain."""
+def _at_origin(placed: PlacedBody) -> tuple[Ball, Ball, Ball]:
+    """Mass, first moment and tensor about the link's origin of a known body."""
+    body, R = placed.body, placed.pose[:3, :3]
+    mass, com, inertia = (_full(part.interval) for part in (body.mass, body.com, body.inertia))
+    arm = apply(R, com)
+    r = arm + Ball.exact(placed.pose[:3, 3].reshape(3, 1, 1, 1))
+    shift = _parallel_axis(r) - _parallel_axis(arm) if body.inertia_about == "frame" else _parallel_axis(r)
+    return mass, mass * r, _rotated(R, inertia) + mass * shift
+
+
+def _joined(parts: list[tuple[Ball, Ball, Ball]]) -> BoxParameters:
+    mass, moment, inertia = (sum_of(column) for column in zip(*parts, strict=True))
+    return BoxParameters(mass, inertia, None, moment)
+
+
+def _reduced(placed: PlacedBody, terms: BoxTerms) -> BoxParameters:
+    """An uncertain body, each parameter at its worst end where that is certain."""
     body, R = placed.body, placed.pose[:3, :3]
     t = Ball.exact(placed.pose[:3, 3].reshape(3, 1, 1, 1))
     about_frame = body.inertia_about == "frame"
-    mass, com, inertia = (_full(part.interval) for part in (body.mass, body.com, body.inertia))
-    if terms is not None and not is_exact(body):
-        slopes = _slopes(terms, R, t[:, 0], com[:, 0], about_frame)
-        intervals = (body.mass.interval, body.com.interval, body.inertia.interval)
-        mass, com, inertia = (_worst(box, slope) for box, slope in zip(intervals, slopes, strict=True))
-    arm = apply(R, com)
-    r = arm + t
-    shift = _parallel_axis(r) - _parallel_axis(arm) if about_frame else _parallel_axis(r)
-    return BoxParameters(mass, mass * r, _rotated(R, inertia) + mass * shift)
+    slopes = _slopes(terms, R, t[:, 0], _full(body.com.interval)[:, 0], about_frame)
+    intervals = (body.mass.interval, body.com.interval, body.inertia.interval)
+    mass, com, inertia = (_worst(box, slope) for box, slope in zip(intervals, slopes, strict=True))
+    arm, inertia = apply(R, com), _rotated(R, inertia)
+    return BoxParameters(mass, inertia, t, mass * arm) if about_frame else BoxParameters(mass, inertia, arm + t, None)
 
 
 def _full(box: Interval) -> Ball:

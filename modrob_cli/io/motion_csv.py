@@ -23,6 +23,7 @@ BLOCK = 2 * 2**20
 LONGEST_LINE = 2**20
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_SPACE = " \t\r\f\v"  # what NumPy skips around numbers
 _BOM = b"\xef\xbb\xbf"
 
 
@@ -89,7 +90,14 @@ class MotionCsv:
             message = f"found more than {LONGEST_LINE} bytes in one line, expected a header: t,q1,..."
             raise InputFileError(Fault(name, message, line=1))
         text = _decoded(name, raw, 1).strip()
-        return [cell.strip() for cell in next(csv.reader([text], skipinitialspace=True))]
+        if "\r" in text:
+            message = "found lines that end with CR alone, expected LF or CR LF; save the file with other line ends"
+            raise InputFileError(Fault(name, message, line=1))
+        try:
+            return [cell.strip() for cell in next(csv.reader([text], skipinitialspace=True))]
+        except csv.Error as error:
+            message = f"found a header that is not a line of CSV ({error}), expected t,q1,...,dq1,...,ddq1,..."
+            raise InputFileError(Fault(name, message, line=1)) from error
 
 
 class _Table:
@@ -157,7 +165,7 @@ class _Table:
         lines: list[int] = []
         rows: list[list[float]] = []
         for line, raw in enumerate(text.split(b"\n"), start=self._line):
-            cells = _decoded(self.file, raw, line).strip().split(",")
+            cells = _decoded(self.file, raw, line).strip(_SPACE).split(",")
             if cells == [""]:
                 continue
             if len(cells) != len(self.header):
@@ -167,7 +175,7 @@ class _Table:
             row = [_number(cell) for cell in cells]
             for column, cell, value in zip(self.header, cells, row, strict=True):
                 if value is None:
-                    found = shorten(cell.strip()) if cell.strip() else "an empty cell"
+                    found = shorten(cell.strip(_SPACE)) if cell.strip(_SPACE) else "an empty cell"
                     message = f"found {found}, expected a finite number"
                     faults.append(Fault(self.file, message, f"column {column}", line))
             lines.append(line)
@@ -198,9 +206,10 @@ class _Table:
 
 def _number(cell: str) -> float | None:
     """A finite decimal number, or None."""
-    if not _NUMBER.fullmatch(cell.strip()):
+    text = cell.strip(_SPACE)
+    if not _NUMBER.fullmatch(text):
         return None
-    value = float(cell)
+    value = float(text)
     return value if np.isfinite(value) else None
 
 

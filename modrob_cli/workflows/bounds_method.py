@@ -10,6 +10,7 @@ from modrob_cli.arrays import Array
 from modrob_cli.assembly.dh_synthesis import dh_table
 from modrob_cli.assembly.interval_tight import tight_intervals
 from modrob_cli.dynamics.box_bounds import box_bounds
+from modrob_cli.dynamics.ddq_bounds import Method as Form
 from modrob_cli.dynamics.ddq_bounds import ddq_bounds
 from modrob_cli.dynamics.exact_bounds import TorqueBounds, exact_bounds
 from modrob_cli.dynamics.ianea import ianea
@@ -25,6 +26,9 @@ from modrob_cli.dynamics.width_share import (
 from modrob_cli.errors import UsageError
 from modrob_cli.model.motion import MotionPiece
 from modrob_cli.model.robot import Robot
+
+MOST_CORNERS = 8
+"""Up to this many tolerances of acceleration the bounds are exact, at up to 2^8 times the cost; else an enclosure."""
 
 Method = Literal["exact", "ianea"]
 Bounder = Callable[[MotionPiece], TorqueBounds]
@@ -112,7 +116,8 @@ def bounder(robot: Robot, method: Method, tolerances: Tolerances) -> Bounder:
     if tolerances.has_noise:
         return lambda m: box_bounds(robot, m.q, m.dq, m.ddq, tolerances.q, tolerances.dq, tolerances.ddq)
     if tolerances.ddq.any():
-        return lambda m: ddq_bounds(robot, m.q, m.dq, m.ddq, tolerances.ddq)
+        form: Form = "corners" if np.count_nonzero(tolerances.ddq) <= MOST_CORNERS else "cheap"
+        return lambda m: ddq_bounds(robot, m.q, m.dq, m.ddq, tolerances.ddq, form)
     return lambda m: exact_bounds(robot, m.q, m.dq, m.ddq)
 
 

@@ -13,8 +13,8 @@ from modrob_cli.dynamics.exact_bounds import exact_bounds
 from modrob_cli.dynamics.pinocchio_backend import inverse_dynamics
 from modrob_cli.errors import NumericalError, ShapeError
 from modrob_cli.interval import Interval
-from modrob_cli.model.body import PlacedBody, RigidBody
-from modrob_cli.model.joint import Drive, Friction, Joint
+from modrob_cli.model.body import InertiaPoint, PlacedBody, RigidBody
+from modrob_cli.model.joint import Drive, Friction, Joint, JointType
 from modrob_cli.model.robot import Robot
 from modrob_cli.model.uncertain import Uncertain
 from modrob_cli.spatial import from_xyz_rpy
@@ -46,13 +46,13 @@ def bare(robot: Robot) -> Robot:
 def random_arm(seed: int) -> Robot:
     """Revolute and prismatic joints with offsets; bodies with boxes, half of them about the frame's origin."""
     rng = np.random.default_rng(seed)
-    kinds = ("revolute", "prismatic", "revolute", "revolute")
-    joints = []
-    bodies = []
+    kinds: tuple[JointType, ...] = ("revolute", "prismatic", "revolute", "revolute")
+    points: tuple[InertiaPoint, ...] = ("com", "frame")
+    joints, bodies = [], []
     for k, kind in enumerate(kinds):
         pose = from_xyz_rpy(rng.uniform(-0.4, 0.4, 3), rng.uniform(-3, 3, 3))
-        joints.append(Joint(f"j{k}", kind, pose, offset=float(rng.uniform(-1, 1))))  # type: ignore[arg-type]
-        for about in ("com", "frame"):
+        joints.append(Joint(f"j{k}", kind, pose, offset=float(rng.uniform(-1, 1))))
+        for about in points:
             com = rng.uniform(-0.1, 0.1, 3)
             entries = np.array([0.2, 0.01, -0.02, 0.3, 0.03, 0.25])
             width = rng.uniform(0, 0.05, 3)
@@ -61,7 +61,7 @@ def random_arm(seed: int) -> Robot:
                 around(float(rng.uniform(0.5, 4.0)), 0.2),
                 Uncertain(com, Interval(com - width, com + width)),
                 Uncertain(entries, Interval(entries - 0.01, entries + 0.01)),
-                about,  # type: ignore[arg-type]
+                about,
             )
             bodies.append(PlacedBody(k + 1, from_xyz_rpy(rng.uniform(-0.2, 0.2, 3), rng.uniform(-3, 3, 3)), body))
     return Robot("random", tuple(joints), tuple(bodies), np.eye(4), np.array([1.0, -3.0, -9.0]), Interval(np.zeros(4)))
@@ -145,13 +145,13 @@ def test_small_boxes_are_reached_at_corners(name: str) -> None:
     """
     rng = np.random.default_rng(23)
     robot = bare(arm(name))
-    n, count = robot.dof, 40
-    tight = 0
-    for first, second in [(a, b) for a in range(3 * n) for b in range(a, 3 * n)]:
+    n, count = robot.dof, 20
+    tight = []
+    for first, second in [*((k, k) for k in range(3 * n)), *rng.integers(0, 3 * n, (20, 2))]:
         middle = rng.uniform(-1, 1, (3, count, n)) * SIZE
         radius = np.zeros((3, count, n))
         for k in (first, second):
-            radius[k // n, :, k % n] = 1e-5
+            radius[k // n, :, k % n] = 1e-6
         bounds = box_bounds(robot, *middle, *radius)
         corners = []
         for signs in product((-1, 1), repeat=2):
@@ -164,9 +164,9 @@ def test_small_boxes_are_reached_at_corners(name: str) -> None:
         # Bounds of the corner's rounding and of exact_bounds' own margin: below 1e-9 here (torques below 1e3).
         assert np.all(bounds.upper >= upper - 1e-9)
         assert np.all(bounds.lower <= lower + 1e-9)
-        tight += int(np.sum((bounds.upper < upper + 1e-9) & (bounds.lower > lower - 1e-9)))
-    pairs = 3 * n * (3 * n + 1) // 2
-    assert tight > 0.9 * pairs * count * n
+        # Second order: 1e-12 times derivatives below 1e3.
+        tight.append(np.mean((bounds.upper < upper + 2e-9) & (bounds.lower > lower - 2e-9)))
+    assert np.mean(tight) > 0.9
 
 
 def excess(robot: Robot, state: Array, h: float, shares: Array) -> float:
@@ -175,23 +175,71 @@ def excess(robot: Robot, state: Array, h: float, shares: Array) -> float:
     q, dq = (state[k] + h * shares[:, k * n : (k + 1) * n] for k in range(2))
     points = exact_bounds(robot, q, dq, np.tile(state[2], (len(q), 1)))
     rad = np.full(n, h)
-    bounds = box_bounds(robot, *state[:, None], rad, rad, 0.0 * rad)
+    bounds = box_bounds(robot, state[:1], state[1:2], state[2:], rad, rad, 0.0 * rad)
     over = (bounds.upper[0] - points.upper.max(axis=0)) + (points.lower.min(axis=0) - bounds.lower[0])
     return float(over.sum())
 
 
-@pytest.mark.parametrize("name", ["lwa4p-6", "lwa4p-6-tol5", "lwa4p-table34", "scara"])
-def test_excess_width_is_of_second_order(name: str) -> None:
-    """Boxes of all q and dq, halved six times: the slope of the excess in a double logarithmic picture."""
+def shrunk(robot: Robot, factor: float) -> Robot:
+    """The robot with smaller boxes of parameters around the same nominal values."""
+
+    def part(old: Uncertain) -> Uncertain:
+        low = old.nominal - factor * (old.nominal - old.interval.inf)
+        high = old.nominal + factor * (old.interval.sup - old.nominal)
+        return Uncertain(old.nominal, Interval(np.minimum(low, old.nominal), np.maximum(high, old.nominal)))
+
+    def body(old: RigidBody) -> RigidBody:
+        return replace(old, mass=part(old.mass), com=part(old.com), inertia=part(old.inertia))
+
+    return replace(robot, bodies=tuple(replace(placed, body=body(placed.body)) for placed in robot.bodies))
+
+
+def fitted_orders(robot: Robot, shrink: bool) -> Array:
+    """For nine states, boxes of all q and dq halved five times: slopes of the excess in a double logarithmic picture."""
     rng = np.random.default_rng(29)
-    robot = bare(arm(name))
-    shares = np.array(list(product((-1.0, 1.0), repeat=2 * robot.dof)))
-    shares = np.vstack([shares, rng.uniform(-1, 1, (500, 2 * robot.dof))])
-    scales = 0.08 * 0.5 ** np.arange(7)
-    states = rng.uniform(-1, 1, (6, 3, robot.dof)) * SIZE[:, 0]
-    total = [sum(excess(robot, state, h, shares) for state in states) for h in scales]
-    order = float(np.polyfit(np.log(scales), np.log(total), 1)[0])
-    assert order > 1.8
+    signs = np.array(list(product((-1.0, 1.0), repeat=2 * robot.dof)))
+    signs = signs[rng.permutation(len(signs))[:1000]]
+    shares = np.vstack([signs, rng.uniform(-1, 1, (200, 2 * robot.dof))])
+    factors = 0.5 ** np.arange(6)
+    orders = []
+    for state in rng.uniform(-1, 1, (9, 3, robot.dof)) * SIZE[:, 0]:
+        over = [excess(shrunk(robot, f) if shrink else robot, state, 0.02 * f, shares) for f in factors]
+        orders.append(np.polyfit(np.log(factors), np.log(over), 1)[0])
+    return np.array(orders)
+
+
+@pytest.mark.parametrize("name", ["lwa4p-6", "scara", "random"])
+def test_excess_width_is_of_second_order_for_known_bodies(name: str) -> None:
+    assert np.all(fitted_orders(shrunk(bare(arm(name)), 0.0), shrink=False) > 1.8)
+
+
+@pytest.mark.parametrize("name", ["lwa4p-6-tol5", "lwa4p-table34", "scara", "random"])
+def test_excess_width_is_of_second_order_in_states_and_parameters(name: str) -> None:
+    assert np.all(fitted_orders(bare(arm(name)), shrink=True) > 1.8)
+
+
+@pytest.mark.parametrize("name", ["lwa4p-6-tol5", "scara"])
+def test_excess_width_is_of_second_order_for_most_states(name: str) -> None:
+    """Parameters keep their boxes, so for some states a part of the excess falls with the first power at this size.
+
+    It does where a parameter's influence on a torque changes its sign near the state.
+    """
+    assert np.median(fitted_orders(bare(arm(name)), shrink=False)) > 1.8
+
+
+def test_excess_width_stays_small_for_a_heavy_uncertain_payload() -> None:
+    """Noise of 1e-3 in all q and dq: the excess beside the width that the box of states really adds."""
+    robot = bare(arm("lwa4p-table34"))
+    rng = np.random.default_rng(43)
+    signs = rng.choice([-1.0, 1.0], (4000, 12))
+    shares = []
+    for state in rng.uniform(-1, 1, (10, 3, 6)) * SIZE[:, 0]:
+        q, dq = state[0] + 1e-3 * signs[:, :6], state[1] + 1e-3 * signs[:, 6:]
+        points = exact_bounds(robot, q, dq, np.tile(state[2], (len(q), 1)))
+        point = exact_bounds(robot, *state[:, None])
+        real = (points.upper.max(axis=0) - points.lower.min(axis=0)) - (point.upper - point.lower)[0]
+        shares.append(excess(robot, state, 1e-3, signs) / real.sum())
+    assert np.median(shares) < 0.1
 
 
 @pytest.mark.parametrize("name", ["lwa4p-table34", "lwa4p-6-tol5", "scara", "random"])
@@ -201,7 +249,8 @@ def test_boxes_without_width_give_the_exact_bounds(name: str) -> None:
     states = rng.uniform(-1, 1, (3, 300, robot.dof)) * SIZE
     states[1, :20] = 0.0
     none = np.zeros(robot.dof)
-    found, expected = box_bounds(robot, *states, none, none, none), exact_bounds(robot, *states)
+    q, dq, ddq = states
+    found, expected = box_bounds(robot, q, dq, ddq, none, none, none), exact_bounds(robot, q, dq, ddq)
     np.testing.assert_array_equal(found.nominal, expected.nominal)
     # The margin of exact_bounds, up to 1600 u times sums of absolute values below 1e3, and as much for the balls.
     np.testing.assert_allclose(found.lower, expected.lower, rtol=0, atol=1e-9)
@@ -214,7 +263,7 @@ def test_boxes_of_accelerations_agree_with_all_corners() -> None:
     robot = bare(arm("lwa4p-6"))
     states = rng.uniform(-1, 1, (3, 50, 6)) * SIZE
     rad = np.array([0.5, 0.2, 0.3, 0.4, 1.0, 2.0])
-    found = box_bounds(robot, *states, 0 * rad, 0 * rad, rad)
+    found = box_bounds(robot, states[0], states[1], states[2], 0 * rad, 0 * rad, rad)
     corners = [
         exact_bounds(robot, states[0], states[1], states[2] + np.array(signs) * rad)
         for signs in product((-1.0, 1.0), repeat=6)

@@ -86,6 +86,7 @@ def test_harmless_differences(tmp_path: Path, text: str) -> None:
         ("1,0x1,3,4,5,6,7", 4, "column q1: found '0x1'"),
         ("1,\u0661,3,4,5,6,7", 4, "column q1: found '\\u0661'"),
         ("1,\x1b[31m,3,4,5,6,7", 4, "column q1: found '\\x1b[31m'"),
+        ("1,\x1e2,3,4,5,6,7", 4, "column q1: found '\\x1e2'"),
         ("1,2 2,3,4,5,6,7", 4, "column q1: found '2 2'"),
         ("1,2,3", 4, "found 3 columns, expected 7 as in the header"),
         ("1,2,3,4,5,6,7,8", 4, "found 8 columns, expected 7"),
@@ -94,7 +95,7 @@ def test_harmless_differences(tmp_path: Path, text: str) -> None:
         ("0.25,2,3,4,5,6,7", 4, "column t: found 0.25, earlier than the 0.5 of the sample before"),
     ],
 )
-@pytest.mark.parametrize("block", [16, 2**21])
+@pytest.mark.parametrize("block", [16, 40, 2**21])
 def test_faulty_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, row: str, line: int, words: str, block: int
 ) -> None:
@@ -107,6 +108,11 @@ def test_faulty_line(
 def test_faults_of_many_lines_come_together(tmp_path: Path) -> None:
     message = fault_of(tmp_path, f"{NUMBERED}\n0,x,2,3,4,y,6\n1,2\n2,1,2,3,4,5,6\n\n3,1,2,3,4,z,6\n")
     assert [line.split(":")[1] for line in message.splitlines()] == ["2", "2", "3", "6"]
+
+
+def test_short_and_long_lines_do_not_make_up_for_each_other(tmp_path: Path) -> None:
+    message = fault_of(tmp_path, f"{NUMBERED}\n0,1,2,3,4,5\n1,1,2,3,4,5,6,7\n")
+    assert message.startswith("motion.csv:2: found 6 columns, expected 7")
 
 
 def test_thousands_of_faults_are_counted(tmp_path: Path) -> None:
@@ -152,9 +158,11 @@ def test_faulty_header(tmp_path: Path, header: str, words: str) -> None:
         (b"\x89MCAP0\r\n\x00", "motion.csv:1: found the byte 0x89, expected UTF-8"),
         (f"{NUMBERED}\n{ROW}\n1,".encode() + b"\xe9", "motion.csv:3: found the byte 0xe9, expected UTF-8"),
         (f"{NUMBERED}\n".encode() + b"\0" * 3_000_000, "motion.csv:2: found more than 1048576 bytes in one line"),
+        (f"{NUMBERED}\n{ROW}\n".replace("\n", "\r").encode(), "motion.csv:1: found lines that end with CR alone"),
+        (b"t," + b"q" * 300_000, "motion.csv:1: found a header that is not a line of CSV (field larger"),
         (b"t," + b"q" * 3_000_000, "motion.csv:1: found more than 1048576 bytes in one line"),
     ],
-    ids=["empty", "only-header", "blank", "utf-16", "mcap", "latin-1", "zeros", "long-header"],
+    ids=["empty", "only-header", "blank", "utf-16", "mcap", "latin-1", "zeros", "cr", "long-name", "long-header"],
 )
 def test_faulty_file(tmp_path: Path, content: bytes, words: str) -> None:
     assert fault_of(tmp_path, content).startswith(words)
