@@ -30,8 +30,8 @@ from modrob_cli.dynamics.uncertain_body import UncertainBody, is_exact, uncertai
 from modrob_cli.errors import NumericalError
 from modrob_cli.model.robot import Robot
 
-CHUNK = 4096
-"""Samples worked on at once: their arrays stay in the processor's cache, and memory does not grow with the motion."""
+CHUNK = 16_384
+"""Samples worked on at once: enough that calls cost little, few enough that memory does not grow with the motion."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,13 @@ def zeros(count: int) -> Array:
 
 def cross(a: Array, b: Array) -> Array:
     """Cross products of vectors (3, T); either may be one vector (3, 1)."""
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    out = np.empty((3, max(a.shape[1], b.shape[1])))
+    part = np.empty(out.shape[1])
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        np.multiply(a[j], b[k], out=out[i])
+        np.multiply(a[k], b[j], out=part)
+        out[i] -= part
+    return out
 
 
 def dot(a: Array, b: Array) -> Array:
@@ -44,9 +50,15 @@ def apply(M: Array, x: Array) -> Array:
 
 def turn_back(cos: Array, sin: Array, x: Array) -> Array:
     """Coordinates in a frame that was turned about z: Rz' x."""
-    return np.stack([cos * x[0] + sin * x[1], cos * x[1] - sin * x[0], x[2]])
+    out = np.empty_like(x)
+    np.multiply(cos, x[0], out=out[0])
+    out[0] += sin * x[1]
+    np.multiply(cos, x[1], out=out[1])
+    out[1] -= sin * x[0]
+    out[2] = x[2]
+    return out
 
 
 def turn(cos: Array, sin: Array, x: Array) -> Array:
     """Coordinates in the frame before a turn about z: Rz x."""
-    return np.stack([cos * x[0] - sin * x[1], sin * x[0] + cos * x[1], x[2]])
+    return turn_back(cos, -sin, x)

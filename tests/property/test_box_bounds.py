@@ -195,7 +195,7 @@ def shrunk(robot: Robot, factor: float) -> Robot:
 
 
 def fitted_orders(robot: Robot, shrink: bool) -> Array:
-    """For nine states, boxes of all q and dq halved five times: slopes of the excess in a double logarithmic picture."""
+    """For nine states, boxes of all q and dq halved five times: slopes of the excess in a log-log picture."""
     rng = np.random.default_rng(29)
     signs = np.array(list(product((-1.0, 1.0), repeat=2 * robot.dof)))
     signs = signs[rng.permutation(len(signs))[:1000]]
