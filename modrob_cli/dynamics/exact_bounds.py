@@ -83,7 +83,9 @@ def bounds_by_chunk(robot: Robot, q: Array, dq: Array, ddq: Array) -> Iterator[T
     prepared = Prepared.of(robot)
     for start in range(0, len(q), CHUNK):
         piece = slice(start, start + CHUNK)
-        yield _chunk(prepared, *by_joint(robot, q[piece], dq[piece], ddq[piece]))
+        with np.errstate(over="ignore", invalid="ignore"):  # not finite in the end is an error of its own
+            bounds = _chunk(prepared, *by_joint(robot, q[piece], dq[piece], ddq[piece]))
+        yield bounds
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,8 @@ def exact_bounds_star(robot: Robot, q: Array, dq: Array, dq_a: Array, ddq: Array
     pieces = [TorqueBounds.empty(robot.dof)]
     for start in range(0, len(q), CHUNK):
         piece = slice(start, start + CHUNK)
-        pieces.append(_chunk(prepared, *by_joint(robot, q[piece], dq[piece], dq_a[piece], ddq[piece])))
+        with np.errstate(over="ignore", invalid="ignore"):  # not finite in the end is an error of its own
+            pieces.append(_chunk(prepared, *by_joint(robot, q[piece], dq[piece], dq_a[piece], ddq[piece])))
     return TorqueBounds.joined(pieces)
 
 

@@ -103,6 +103,7 @@ def _style(axis: Any, t: Array) -> None:
     axis.set_axisbelow(True)
     axis.grid(True, color="#e3e3e3", linewidth=0.6)
     axis.yaxis.set_major_locator(MaxNLocator(5))
+    axis.ticklabel_format(axis="y", scilimits=(-2, 4))
     axis.margins(x=0.0 if len(t) > 1 else 0.5)
     axis.spines[["top", "right"]].set_visible(False)
 
