@@ -1,6 +1,7 @@
 """Torque bounds over boxes of states: against Pinocchio at sampled members, corners, and brute force."""
 
 from dataclasses import replace
+from decimal import Decimal
 from itertools import product
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from modrob_cli.model.robot import Robot
 from modrob_cli.model.uncertain import Uncertain
 from modrob_cli.spatial import from_xyz_rpy
 from modrob_cli.workflows.robots import load_robot
+from tests.high_precision import nominal_parameters, rigid_torques
 
 ARMS = Path(__file__).parents[2] / "assemblies"
 SIZE = np.array([3.0, 1.2, 2.0])[:, None, None]
@@ -240,6 +242,24 @@ def test_excess_width_stays_small_for_a_heavy_uncertain_payload() -> None:
         real = (points.upper.max(axis=0) - points.lower.min(axis=0)) - (point.upper - point.lower)[0]
         shares.append(excess(robot, state, 1e-3, signs) / real.sum())
     assert np.median(shares) < 0.1
+
+
+@pytest.mark.parametrize("name", ["lwa4p-6", "scara", "random"])
+@pytest.mark.parametrize("radius", [0.0, 1e-12, 1e-4])
+def test_members_with_60_digits_lie_inside(name: str, radius: float) -> None:
+    """No room for rounding at all: states at the very ends of boxes, known bodies."""
+    rng = np.random.default_rng(47)
+    robot = shrunk(bare(arm(name)), 0.0)
+    middle = rng.uniform(-1, 1, (3, 30, robot.dof)) * SIZE
+    middle[0, :5] *= 1e5
+    bounds = box_bounds(robot, middle[0], middle[1], middle[2], *np.full((3, robot.dof), radius))
+    # Rounded to nearest, an end may be outside by half a unit; the double next to it inwards is not.
+    ends = middle + rng.choice([-1.0, 1.0], middle.shape) * radius
+    for state in (middle, np.nextafter(ends, middle)):
+        for k in range(30):
+            true = rigid_torques(robot, state[0, k], state[1, k], state[2, k], nominal_parameters(robot))
+            for lower, tau, upper in zip(bounds.lower[k], true, bounds.upper[k], strict=True):
+                assert Decimal(float(lower)) <= tau <= Decimal(float(upper))
 
 
 @pytest.mark.parametrize("name", ["lwa4p-table34", "lwa4p-6-tol5", "scara", "random"])
