@@ -25,7 +25,7 @@ from modrob_cli.dynamics.link_motion import (
     link_motions,
 )
 from modrob_cli.dynamics.margin import rounding_margin, torque_magnitude
-from modrob_cli.dynamics.newton_euler import backward
+from modrob_cli.dynamics.newton_euler import backward, nominal_links
 from modrob_cli.dynamics.uncertain_body import UncertainBody, is_exact, uncertain_bodies
 from modrob_cli.errors import NumericalError
 from modrob_cli.model.robot import Robot
@@ -107,9 +107,8 @@ class Prepared:
     def of(cls, robot: Robot) -> "Prepared":
         """Prepare a robot."""
         moving = [robot.bodies_of(i + 1) for i in range(robot.dof)]
-        nominal = [joined(bodies) for bodies in moving]
         known = [joined(placed for placed in bodies if is_exact(placed.body)) for bodies in moving]
-        return cls(robot, nominal, known, uncertain_bodies(robot), drive_boxes(robot))
+        return cls(robot, nominal_links(robot), known, uncertain_bodies(robot), drive_boxes(robot))
 
 
 def _chunk(prepared: Prepared, q: Array, dq: Array, ddq: Array) -> TorqueBounds:

@@ -53,7 +53,8 @@ from modrob_cli.dynamics.interval_vectors import (
 from modrob_cli.dynamics.link_inertia import LinearParameters
 from modrob_cli.dynamics.link_motion import JointPosition, by_joint, joint_positions
 from modrob_cli.dynamics.margin import rounding_margin, torque_magnitude
-from modrob_cli.dynamics.newton_euler_star import StarMotion, nominal_links, star_backward, star_motions
+from modrob_cli.dynamics.newton_euler import nominal_links
+from modrob_cli.dynamics.newton_euler_star import StarMotion, star_backward, star_motions
 from modrob_cli.dynamics.vectors import apply, zeros
 from modrob_cli.errors import NumericalError, ShapeError
 from modrob_cli.model.robot import Robot

@@ -28,17 +28,26 @@ def rnea(robot: Robot, q: Array, dq: Array, ddq: Array) -> Array:
     q, dq, ddq = by_joint(robot, q, dq, ddq)
     positions = joint_positions(robot, q)
     motions = link_motions(positions, dq, ddq, base_motion(robot, q.shape[1]))
-    links = [joined(robot.bodies_of(i + 1)) for i in range(robot.dof)]
-    return np.ascontiguousarray(backward(positions, motions, links).T)
+    return np.ascontiguousarray(backward(positions, motions, nominal_links(robot)).T)
+
+
+def nominal_links(robot: Robot) -> list[LinearParameters]:
+    """Nominal parameters of links 1..n."""
+    return [joined(robot.bodies_of(i + 1)) for i in range(robot.dof)]
 
 
 def backward(positions: list[JointPosition], motions: list[Motion], links: list[LinearParameters]) -> Array:
-    """Torques (n, T) of links with given linear parameters in given motion: forces summed from the tip to the base."""
-    count = motions[0].omega.shape[1]
+    """Torques (n, T) of links with given linear parameters in given motion."""
+    return sum_wrenches(positions, [link_wrench(*pair) for pair in zip(motions, links, strict=True)])
+
+
+def sum_wrenches(positions: list[JointPosition], wrenches: list[tuple[Array, Array]]) -> Array:
+    """Torques (n, T): each link's force and moment about its origin, (3, T), summed from the tip to the base."""
+    count = wrenches[0][0].shape[1]
     force, moment = zeros(count), zeros(count)
-    tau = np.empty((len(links), count))
-    for i in reversed(range(len(links))):
-        f, n = link_wrench(motions[i], links[i])
+    tau = np.empty((len(wrenches), count))
+    for i in reversed(range(len(wrenches))):
+        f, n = wrenches[i]
         force, moment = force + f, moment + n
         tau[i] = moment[2] if positions[i].is_revolute else force[2]
         if i:

@@ -24,9 +24,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from modrob_cli.arrays import Array
-from modrob_cli.dynamics.link_inertia import LinearParameters, joined
+from modrob_cli.dynamics.link_inertia import LinearParameters
 from modrob_cli.dynamics.link_motion import JointPosition, base_motion, by_joint, joint_positions
-from modrob_cli.dynamics.vectors import apply, cross, zeros
+from modrob_cli.dynamics.newton_euler import nominal_links, sum_wrenches
+from modrob_cli.dynamics.vectors import apply, cross
 from modrob_cli.model.robot import Robot
 
 
@@ -105,24 +106,9 @@ def rnea_star(robot: Robot, q: Array, dq: Array, dq_a: Array, ddq: Array) -> Arr
     return np.ascontiguousarray(star_backward(positions, motions, nominal_links(robot)).T)
 
 
-def nominal_links(robot: Robot) -> list[LinearParameters]:
-    """Nominal parameters of links 1..n."""
-    return [joined(list(robot.bodies_of(i + 1))) for i in range(robot.dof)]
-
-
 def star_backward(positions: list[JointPosition], motions: list[StarMotion], links: list[LinearParameters]) -> Array:
-    """Torques (n, T): forces and moments summed from the tip to the base. [D] Alg. 4, lines 25-34."""
-    count = motions[0].omega.shape[1]
-    force, moment = zeros(count), zeros(count)
-    tau = np.empty((len(links), count))
-    for i in reversed(range(len(links))):
-        f, n = _wrench(motions[i], links[i])
-        force, moment = force + f, moment + n
-        tau[i] = moment[2] if positions[i].is_revolute else force[2]
-        if i:
-            force, moment = positions[i].to_previous(force), positions[i].to_previous(moment)
-            moment = moment + cross(positions[i].p, force)
-    return tau
+    """Torques (n, T) of links with given linear parameters. [D] Alg. 4, lines 25-34."""
+    return sum_wrenches(positions, [_wrench(*pair) for pair in zip(motions, links, strict=True)])
 
 
 def _wrench(motion: StarMotion, link: LinearParameters) -> tuple[Array, Array]:

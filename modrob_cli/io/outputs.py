@@ -103,17 +103,13 @@ class OutputFolder:
     def write(self, name: str, content: str | bytes) -> Path:
         """Stage a file with this content; returns its final path."""
         raw = content.encode() if isinstance(content, str) else content
-        path = self.stage(name)
-        try:
-            path.write_bytes(raw)
-        except OSError as error:
-            raise UsageError(f"cannot write {self.folder / name}: {error.strerror}") from error
+        self.stage(name).write_bytes(raw)
         return self.folder / name
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Rename all files into place, or remove all of them."""
+        """Rename all files into place, or remove all of them; a failure to write becomes a UsageError."""
         if kind is None:
             umask = os.umask(0)
             os.umask(umask)
@@ -126,3 +122,5 @@ class OutputFolder:
         for folder in self._made:
             if folder.is_dir() and not any(folder.iterdir()):
                 folder.rmdir()
+        if isinstance(error, OSError):
+            raise UsageError(f"cannot write into {self.folder}: {error.strerror or error}") from error

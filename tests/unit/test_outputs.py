@@ -110,8 +110,15 @@ def test_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Path, "write_bytes", refuse)
-    with pytest.raises(UsageError, match=r"cannot write .*x\.csv: No space left"), OutputFolder(tmp_path / "a") as out:
+    with pytest.raises(UsageError, match="cannot write into .*No space left"), OutputFolder(tmp_path / "a") as out:
         out.write("x.csv", "1")
+    assert names(tmp_path) == []
+
+
+def test_a_full_disk_while_a_library_writes(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="cannot write into .*No space left"), OutputFolder(tmp_path / "a") as out:
+        out.stage("x.png").write_bytes(b"half")
+        raise OSError(28, "No space left on device")
     assert names(tmp_path) == []
 
 
