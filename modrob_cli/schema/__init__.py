@@ -4,12 +4,14 @@ from modrob_cli.schema.assembly import AssemblyDocument
 from modrob_cli.schema.base import Document
 from modrob_cli.schema.module import ModuleDocument
 from modrob_cli.schema.robot import RobotDocument
+from modrob_cli.schema.trajectory import TrajectoryDocument
 
 DOCUMENTS: dict[str, type[Document]] = {
     "module/1": ModuleDocument,
     "assembly/1": AssemblyDocument,
     "robot/1": RobotDocument,
+    "trajectory/1": TrajectoryDocument,
 }
 """Document kinds by the value of their first key ``modrob``."""
 
-__all__ = ["DOCUMENTS", "AssemblyDocument", "Document", "ModuleDocument", "RobotDocument"]
+__all__ = ["DOCUMENTS", "AssemblyDocument", "Document", "ModuleDocument", "RobotDocument", "TrajectoryDocument"]

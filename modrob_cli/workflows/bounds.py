@@ -9,7 +9,6 @@ import numpy as np
 
 from modrob_cli.arrays import Array
 from modrob_cli.dynamics.exact_bounds import TorqueBounds
-from modrob_cli.io.motion_csv import MotionCsv
 from modrob_cli.io.number_csv import NumberCsv
 from modrob_cli.io.outputs import OutputFolder, provenance
 from modrob_cli.model.motion import LimitWatch, ThinnedMotion
@@ -18,6 +17,7 @@ from modrob_cli.plot.bounds import BoundsCurves
 from modrob_cli.workflows.bounds_method import BoundsOptions, Tolerances, bounder, shares
 from modrob_cli.workflows.bounds_summary import Summary, share_json, shares_csv, warning_json
 from modrob_cli.workflows.robots import load_robot
+from modrob_cli.workflows.trajectory_motion import TrajectoryMotion, motion_reader
 
 SHARE_SAMPLES = 4000
 """Of a longer motion, between half as many and as many evenly picked samples tell where the width comes from."""
@@ -32,6 +32,7 @@ def bounds(
     out: Path,
     overwrite: bool = False,
     report: Reporter = lambda fraction: None,
+    rate: float | None = None,
 ) -> dict[str, Any]:
     """Bound the torques over a motion; tables, JSON and a picture.
 
@@ -40,6 +41,7 @@ def bounds(
     Parameters
     ----------
     report : called with the fraction that is done
+    rate : samples per second of a motion that is a trajectory document
 
     Returns
     -------
@@ -65,7 +67,7 @@ def bounds(
     names["picture"] = f"{stem}.bounds.png"
     watch, thinned, summary = LimitWatch(robot), ThinnedMotion(SHARE_SAMPLES), Summary(robot)
     curves = BoundsCurves(robot.dof)
-    reader = MotionCsv(motion_path, robot.joint_names)
+    reader = motion_reader(motion_path, robot, rate)
     with OutputFolder(out, overwrite) as folder:
         folder.claim(list(names.values()))
         with NumberCsv(folder.stage(names["bounds"]), _header(robot)) as table:
@@ -81,6 +83,7 @@ def bounds(
         ranking = shares(robot, thinned.motion(), tolerances)
         result = {
             **summary.to_json(options),
+            "rate": reader.rate if isinstance(reader, TrajectoryMotion) else None,
             "shares": [share_json(robot, i, ranking[i]) for i in range(robot.dof)],
             "share_samples": len(thinned.motion().t),
             "warnings": [warning_json(robot, excess, summary.samples) for excess in watch.found()],

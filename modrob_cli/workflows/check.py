@@ -13,7 +13,7 @@ from modrob_cli.io.catalogue import Catalogue, read_assembly, yaml_files
 from modrob_cli.io.documents import check_document, kind_of
 from modrob_cli.io.yaml_loader import YamlDocument, is_folder, load_yaml
 from modrob_cli.model.plausibility import Remark, assembly_remarks, module_remarks, robot_remarks
-from modrob_cli.schema import AssemblyDocument, ModuleDocument, RobotDocument
+from modrob_cli.schema import AssemblyDocument, ModuleDocument, RobotDocument, TrajectoryDocument
 
 
 @dataclass(frozen=True)
@@ -125,6 +125,8 @@ def _remarks(path: Path, loaded: YamlDocument, catalogue: Catalogue) -> tuple[It
     if isinstance(document, AssemblyDocument):
         found = read_assembly(path, catalogue)
         return assembly_remarks(found.assembly, synthesize(found.assembly)), found.files[1:]
+    if isinstance(document, TrajectoryDocument):
+        document.to_model()
     return iter(()), []
 
 

@@ -116,9 +116,13 @@ def test_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_full_disk_while_a_library_writes(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="cannot write into .*No space left"), OutputFolder(tmp_path / "a") as out:
-        out.stage("x.png").write_bytes(b"half")
-        raise OSError(28, "No space left on device")
+    def write() -> None:
+        with OutputFolder(tmp_path / "a") as out:
+            out.stage("x.png").write_bytes(b"half")
+            raise OSError(28, "No space left on device")
+
+    with pytest.raises(UsageError, match="cannot write into .*No space left"):
+        write()
     assert names(tmp_path) == []
 
 
