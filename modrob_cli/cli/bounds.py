@@ -74,7 +74,7 @@ def _bounds(
     )
     with _progress() as report:
         result = bounds(robot, motion, options, out, overwrite, report, rate)
-    _say_result(result)
+    say_result(result)
     if as_json:
         print_json(result)
 
@@ -95,7 +95,8 @@ def _progress() -> Iterator[Callable[[float], None]]:
         yield lambda fraction: progress.update(task, completed=fraction)
 
 
-def _say_result(result: dict[str, Any]) -> None:
+def say_result(result: dict[str, Any]) -> None:
+    """Print the table of joints and what makes their bounds wide."""
     for warning in result["warnings"]:
         say(f"warning: {warning['message']}")
     span = f"t = {result['start']:.6g} .. {result['end']:.6g} s"

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from modrob_cli.cli.assemble import show_robot, summary_table
+from modrob_cli.cli.bounds import say_result
 from modrob_cli.cli.check import summary_line
 from modrob_cli.cli.console import say, table
 from modrob_cli.cli.options import OutDir, Overwrite
@@ -18,7 +19,7 @@ _DEFAULT = Path("out/demo")
 
 
 def demo(out: OutDir = _DEFAULT, overwrite: Overwrite = False) -> None:
-    """Run the whole chain on the shipped example: check, assemble, draw."""
+    """Run the whole chain on the shipped example: check, assemble, draw, bound torques."""
     from modrob_cli.workflows import demo as workflow
 
     result = workflow.demo(out, overwrite, announce=lambda step: say(f"\n{step}"))
@@ -36,8 +37,13 @@ def _report(result: "DemoResult", main: str, uncertain: str) -> None:
     say(f"\nThe same arm with 5 % on every module ({uncertain}): how wide its link parameters are, and how much wider")
     say("the published interval synthesis makes them (1 = as tight as can be):\n")
     say(_widening(result.robot(uncertain)))
+    say(
+        "\nThe torques of the arm along Table B.1 of the dissertation, for every gripper from 1.5 to 3 kg that its file"
+    )
+    say("1.5 to 3 kg that its file admits (the published motion is slightly too fast for one joint):\n")
+    say_result(result.bounds)
     say(f"\nEverything is in {result.folder}/; {result.folder}/README.md says what each file is.")
-    say(f"Look at {result.folder}/pose/{main}.png first.")
+    say(f"Look at {result.folder}/pose/{main}.png and {result.folder}/bounds/*.png first.")
 
 
 def _widening(robot: "AssembledRobot") -> str:
