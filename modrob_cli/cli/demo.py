@@ -37,9 +37,7 @@ def _report(result: "DemoResult", main: str, uncertain: str) -> None:
     say(f"\nThe same arm with 5 % on every module ({uncertain}): how wide its link parameters are, and how much wider")
     say("the published interval synthesis makes them (1 = as tight as can be):\n")
     say(_widening(result.robot(uncertain)))
-    say(
-        "\nThe torques of the arm along Table B.1 of the dissertation, for every gripper from 1.5 to 3 kg that its file"
-    )
+    say("\nThe torques of the arm along Table B.1 of the dissertation, for every last link of")
     say("1.5 to 3 kg that its file admits (the published motion is slightly too fast for one joint):\n")
     say_result(result.bounds)
     say(f"\nEverything is in {result.folder}/; {result.folder}/README.md says what each file is.")
