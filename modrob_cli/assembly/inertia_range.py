@@ -9,16 +9,16 @@ The result always encloses the exact range; it exceeds it by at most ``TOLERANCE
 where ``MAX_BOXES`` boxes did not suffice (many free directions at an interior optimum), by the gap that is left then.
 
 Rounding: values and bounds are computed in round-to-nearest. A value is a sum over bodies of products of at most
-three rounded factors; with u = 2^-53 it is off by less than 30 u S, where S (``_magnitude``) is at least four times the
-sum of the absolute values of all terms. Transforms that are off by 120 u in their entries change it by less than
-2 * 120 u S / 4. ``ROUNDING`` S = 180 u S covers both and is added on each side.
+three rounded factors; with u = 2^-53 it is off by less than 30 u S, where S (``inertia_magnitude``) is at least four
+times the sum of the absolute values of all terms. Transforms that are off by 120 u in their entries change it by less
+than 2 * 120 u S / 4. ``ROUNDING`` S = 180 u S covers both and is added on each side.
 """
 
 import numpy as np
 
 from modrob_cli.arrays import Array, Indices
-from modrob_cli.assembly.interval_published import ROUNDING
 from modrob_cli.assembly.link_box import LinkBox
+from modrob_cli.assembly.rounding import ROUNDING, inertia_magnitude
 from modrob_cli.interval import Interval
 from modrob_cli.model.body import PlacedBody, tensor
 
@@ -38,7 +38,7 @@ def inertia_range(bodies: list[PlacedBody]) -> Interval:
     own = _own_tensors(bodies)
     link = LinkBox.of(bodies)
     low, high = _box(bodies)
-    scale = _magnitude(bodies)
+    scale = inertia_magnitude(bodies)
     if np.array_equal(low, high):
         spread = Interval(link.value(np.repeat(low[None], 6, axis=0), np.arange(6)))
     else:
@@ -66,15 +66,6 @@ def _box(bodies: list[PlacedBody]) -> tuple[Array, Array]:
     low = np.concatenate([[item.inf for item in mass], *(item.inf for item in com)])
     high = np.concatenate([[item.sup for item in mass], *(item.sup for item in com)])
     return low, high
-
-
-def _magnitude(bodies: list[PlacedBody]) -> float:
-    """Bound of the sum of absolute values of all terms of any entry, in any order of evaluation."""
-    points = [np.abs(p.pose[:3, 3]) + np.abs(p.pose[:3, :3]) @ p.body.com.interval.mag for p in bodies]
-    reach = [float(np.linalg.norm(point)) for point in points]
-    mass = sum(float(placed.body.mass.interval.sup) for placed in bodies)
-    own = sum(float(placed.body.inertia.interval.mag.sum()) * 3.0 for placed in bodies)
-    return float(mass * (2.0 * max(reach)) ** 2 + own)
 
 
 def _branch_and_bound(link: LinkBox, low: Array, high: Array, tolerance: float) -> Interval:

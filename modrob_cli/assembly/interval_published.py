@@ -15,14 +15,11 @@ import numpy as np
 
 from modrob_cli.arrays import Array
 from modrob_cli.assembly.link_parameters import LinkIntervals, placed_in
+from modrob_cli.assembly.rounding import ROUNDING, exact_link
 from modrob_cli.interval import Interval
 from modrob_cli.model.body import PlacedBody, tensor, tensor_entries
 from modrob_cli.model.robot import Robot
 from modrob_cli.spatial import invert
-
-ROUNDING = 2e-14
-"""Relative allowance for rounding outside interval operations, 180 units of 2^-53. A product of rotations and
-translations adds at most 6 units per factor to an entry; a link of ten modules has some 20 factors that round."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +46,9 @@ def _stack(parts: list[Interval]) -> Interval:
 
 def _link(bodies: list[PlacedBody]) -> tuple[Interval, Interval, Interval]:
     """Mass (), com (3,) and inertia entries (6,) about the centre of mass."""
-    if not bodies:
-        return Interval(0.0), Interval(np.zeros(3)), Interval(np.zeros(6))
+    known = exact_link(bodies)
+    if known is not None:
+        return known
     part = _of(bodies[0])
     for before, placed in zip(bodies, bodies[1:], strict=False):
         part = _merge(_move(part, invert(before.pose) @ placed.pose), _of(placed))

@@ -4,8 +4,8 @@ import numpy as np
 
 from modrob_cli.arrays import Array
 from modrob_cli.assembly.inertia_range import inertia_range
-from modrob_cli.assembly.interval_published import ROUNDING
 from modrob_cli.assembly.link_parameters import LinkIntervals, placed_in
+from modrob_cli.assembly.rounding import ROUNDING, exact_link
 from modrob_cli.interval import Interval
 from modrob_cli.model.body import PlacedBody
 from modrob_cli.model.robot import Robot
@@ -26,8 +26,9 @@ def tight_intervals(robot: Robot, frames: Array) -> LinkIntervals:
 
 def _link(bodies: list[PlacedBody]) -> tuple[Interval, Interval, Interval]:
     bodies = [placed for placed in bodies if not placed.body.is_massless]
-    if not bodies:
-        return Interval(0.0), Interval(np.zeros(3)), Interval(np.zeros(6))
+    known = exact_link(bodies)
+    if known is not None:
+        return known
     mass = Interval(0.0)
     for placed in bodies:
         mass = mass + placed.body.mass.interval

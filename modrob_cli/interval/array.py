@@ -64,6 +64,15 @@ class Interval:
         return Interval, (self.inf, self.sup)
 
     @classmethod
+    def _of_ends(cls, inf: ArrayLike, sup: ArrayLike) -> "Interval":
+        """From end points that an operation of this class has made, which need no check and no copy."""
+        out = object.__new__(cls)
+        for name, end in (("inf", np.asarray(inf)), ("sup", np.asarray(sup))):
+            end.setflags(write=False)
+            object.__setattr__(out, name, end)
+        return out
+
+    @classmethod
     def of(cls, value: "Interval | ArrayLike") -> "Interval":
         """Return ``value`` itself if it is an Interval, else the degenerate interval of it."""
         return value if isinstance(value, Interval) else cls(value)
@@ -125,7 +134,7 @@ class Interval:
 
     def __getitem__(self, key: Any) -> "Interval":
         """Index or slice as an ndarray."""
-        return Interval(self.inf[key], self.sup[key])
+        return Interval._of_ends(self.inf[key], self.sup[key])
 
     def __len__(self) -> int:
         """Length of the first axis."""
@@ -133,7 +142,7 @@ class Interval:
 
     def __neg__(self) -> "Interval":
         """Exact negation."""
-        return Interval(-self.sup, -self.inf)
+        return Interval._of_ends(-self.sup, -self.inf)
 
     def __pos__(self) -> Self:
         """Return itself."""
@@ -142,7 +151,7 @@ class Interval:
     def __add__(self, other: "Interval | ArrayLike") -> "Interval":
         """Sum."""
         other = Interval.of(other)
-        return Interval(rounding.add(self.inf, other.inf)[0], rounding.add(self.sup, other.sup)[1])
+        return Interval._of_ends(rounding.add(self.inf, other.inf)[0], rounding.add(self.sup, other.sup)[1])
 
     __radd__ = __add__
 
@@ -183,7 +192,7 @@ class Interval:
         parts = range(self.inf.shape[axis])
         total = Interval(np.zeros(np.delete(self.shape, axis)))
         for k in parts:
-            total = total + Interval(self.inf.take(k, axis), self.sup.take(k, axis))
+            total = total + Interval._of_ends(self.inf.take(k, axis), self.sup.take(k, axis))
         return total
 
     def __matmul__(self, other: "Interval | ArrayLike") -> "Interval":
@@ -198,12 +207,12 @@ class Interval:
     def reshape_last(self, new_axes: int) -> "Interval":
         """Append ``new_axes`` axes of length one."""
         shape = self.shape + (1,) * new_axes
-        return Interval(self.inf.reshape(shape), self.sup.reshape(shape))
+        return Interval._of_ends(self.inf.reshape(shape), self.sup.reshape(shape))
 
     @property
     def T(self) -> "Interval":  # noqa: N802 - NumPy's name
         """Transpose of the last two axes."""
-        return Interval(np.swapaxes(self.inf, -1, -2), np.swapaxes(self.sup, -1, -2))
+        return Interval._of_ends(np.swapaxes(self.inf, -1, -2), np.swapaxes(self.sup, -1, -2))
 
     def __repr__(self) -> str:
         """Show both ends."""
@@ -223,4 +232,4 @@ def _over_ends(a: Interval, b: Interval, operation: Pairwise) -> Interval:
     pairs = [operation(x, y) for x in (a.inf, a.sup) for y in (b.inf, b.sup)]
     inf = np.minimum.reduce([down for down, _ in pairs])
     sup = np.maximum.reduce([up for _, up in pairs])
-    return Interval(inf, sup)
+    return Interval._of_ends(inf, sup)
