@@ -23,7 +23,7 @@ def exact(values: Array) -> Any:
 
 
 def cos_sin(angle: float) -> tuple[Decimal, Decimal]:
-    """Cosine and sine of the exact double."""
+    """Cosine and sine of the exact double, to 60 digits."""
     with mpmath.workdps(DIGITS + 15):
         x = mpmath.mpf(angle)
         return Decimal(mpmath.nstr(mpmath.cos(x), DIGITS + 5)), Decimal(mpmath.nstr(mpmath.sin(x), DIGITS + 5))

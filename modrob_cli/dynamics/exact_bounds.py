@@ -24,7 +24,7 @@ from modrob_cli.dynamics.link_motion import (
     joint_positions,
     link_motions,
 )
-from modrob_cli.dynamics.margin import rounding_margin, torque_magnitude
+from modrob_cli.dynamics.margin import most_bodies, rounding_margin, torque_magnitude
 from modrob_cli.dynamics.newton_euler import backward, nominal_links
 from modrob_cli.dynamics.uncertain_body import UncertainBody, is_exact, uncertain_bodies
 from modrob_cli.errors import NumericalError
@@ -105,7 +105,16 @@ class Prepared:
 
     @classmethod
     def of(cls, robot: Robot) -> "Prepared":
-        """Prepare a robot."""
+        """Prepare a robot.
+
+        Raises
+        ------
+        NumericalError
+            If it has more bodies than the proof of the rounding margin covers.
+        """
+        if len(robot.bodies) > most_bodies(robot.dof):
+            message = f"bounds are proven for up to {most_bodies(robot.dof)} bodies on {robot.dof} joints"
+            raise NumericalError(f"{robot.name} has {len(robot.bodies)} bodies; {message}; join some of them")
         moving = [robot.bodies_of(i + 1) for i in range(robot.dof)]
         known = [joined(placed for placed in bodies if is_exact(placed.body)) for bodies in moving]
         return cls(robot, nominal_links(robot), known, uncertain_bodies(robot), drive_boxes(robot))

@@ -111,16 +111,29 @@ class OutputFolder:
     ) -> None:
         """Rename all files into place, or remove all of them; a failure to write becomes a UsageError."""
         if kind is None:
-            umask = os.umask(0)
-            os.umask(umask)
-            for target, path in self._staged.items():
-                path.chmod(0o666 & ~umask)
-                path.replace(target)
+            try:
+                self._rename()
+            except OSError as problem:
+                self._discard()
+                raise UsageError(f"cannot write into {self.folder}: {problem.strerror or problem}") from problem
             return
+        self._discard()
+        if isinstance(error, OSError):
+            raise UsageError(f"cannot write into {self.folder}: {error.strerror or error}") from error
+
+    def _rename(self) -> None:
+        """Put the staged files into place, with the permissions of any new file."""
+        umask = os.umask(0)
+        os.umask(umask)
+        for path in self._staged.values():
+            path.chmod(0o666 & ~umask)
+        for target, path in self._staged.items():
+            path.replace(target)
+
+    def _discard(self) -> None:
+        """Remove what is staged, and folders that were made for it."""
         for path in self._staged.values():
             path.unlink(missing_ok=True)
         for folder in self._made:
             if folder.is_dir() and not any(folder.iterdir()):
                 folder.rmdir()
-        if isinstance(error, OSError):
-            raise UsageError(f"cannot write into {self.folder}: {error.strerror or error}") from error

@@ -26,7 +26,7 @@ from modrob_cli.model.robot import Robot
 from modrob_cli.model.uncertain import Uncertain
 from modrob_cli.workflows.robots import load_robot
 from tests.box_members import many_torques, random_parameters, rigid_torque, with_parameters, worst_parameters
-from tests.high_precision import nominal_parameters, rigid_torques
+from tests.high_precision import cos_sin, nominal_parameters, rigid_torques
 from tests.random_chains import random_chain
 
 ROOT = Path(__file__).parents[2]
@@ -231,6 +231,25 @@ def test_uncertain_accelerations(name: str) -> None:
         inside = exact_bounds(robot, q, dq, ddq + rng.uniform(-1.0, 1.0, ddq.shape) * tolerance)
         assert np.all(inside.lower >= exact.lower - 1e-10)
         assert np.all(inside.upper <= exact.upper + 1e-10)
+
+
+def test_sines_and_cosines_are_as_good_as_the_proof_asks() -> None:
+    """Within 4 units of 2^-53 absolutely, in the vectorised code paths, up to angles of 1e6 rad."""
+    rng = np.random.default_rng(13)
+    angles = rng.uniform(-1.0, 1.0, 3000) * rng.choice([1.0, 100.0, 1e6], 3000)
+    cos, sin = np.cos(angles), np.sin(angles)
+    for k, angle in enumerate(angles):
+        exact = cos_sin(float(angle))
+        for got, true in zip((cos[k], sin[k]), exact, strict=True):
+            assert abs(Decimal(float(got)) - true) <= 4 * Decimal(2) ** -53
+
+
+def test_more_bodies_than_the_proof_covers_are_refused() -> None:
+    robot = shipped("planar-2r")
+    crowded = replace(robot, bodies=robot.bodies * 200)
+    state = np.zeros((1, 2))
+    with pytest.raises(NumericalError, match="bodies"):
+        exact_bounds(crowded, state, state, state)
 
 
 def test_bad_shapes_and_absurd_motions_are_refused() -> None:

@@ -126,6 +126,16 @@ def test_a_full_disk_while_a_library_writes(tmp_path: Path) -> None:
     assert names(tmp_path) == []
 
 
+def test_a_rename_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(Path, "replace", refuse)
+    with pytest.raises(UsageError, match="cannot write into .*Input/output"), OutputFolder(tmp_path / "a") as out:
+        out.write("x.csv", "1")
+    assert names(tmp_path) == []
+
+
 def test_files_have_the_usual_permissions(tmp_path: Path) -> None:
     before = os.umask(0o027)
     try:

@@ -12,6 +12,11 @@ from modrob_cli.dynamics.quadratic_range import quadratic_range
 ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 Rational = list[Fraction]
 
+SLACK = 1.1e-6
+"""What nearly singular matrices of size near 1 may cost in a box of half-widths up to 1: sqrt(3) times an eigenvalue
+(up to 1e-7) times a squared length of at most 3, once for faces of two and once of three
+dimensions."""
+
 
 def solve(A: list[Rational], b: Rational) -> Rational | None:
     """Gauss elimination in rationals; None if singular."""
@@ -96,9 +101,8 @@ def test_range_holds_the_exact_one_and_is_close(eigenvalues: tuple[float, float,
         rounding = 100 * 2.0**-53 * 12
         assert low[0] <= float(exact_low) + rounding
         assert high[0] >= float(exact_high) - rounding
-        # What a nearly singular matrix may cost: its smallest eigenvalue (up to 1e-8) times a squared length of 3.
-        assert low[0] >= float(exact_low) - 1e-7
-        assert high[0] <= float(exact_high) + 1e-7
+        assert low[0] >= float(exact_low) - SLACK
+        assert high[0] <= float(exact_high) + SLACK
 
 
 def test_matrices_aligned_with_the_axes() -> None:
@@ -115,3 +119,26 @@ def test_matrices_aligned_with_the_axes() -> None:
 def test_no_free_variable_gives_zero() -> None:
     low, high = quadratic_range(np.ones((3, 2)), np.ones((6, 2)), np.zeros(3))
     assert low.tolist() == high.tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    "eigenvalues", [(-1.0, -1e-6, -2e-8), (-1.0, -1e-7, -1e-7), (-1.0, -3e-8, -2e-8), (-1.0, -1e-3, -1e-7)]
+)
+def test_ill_conditioned_interior_optimum_is_not_missed(eigenvalues: tuple[float, float, float]) -> None:
+    """The optimum is put inside the box on purpose, with a large part along the stiff direction."""
+    rng = np.random.default_rng(23)
+    r = np.ones(3)
+    for _ in range(200):
+        Q = matrix(rng, eigenvalues)
+        full = np.zeros((3, 3))
+        for (i, j), value in zip(ENTRIES, Q, strict=True):
+            full[i, j] = full[j, i] = value
+        b = -2.0 * full @ rng.uniform(-0.5, 0.5, 3)
+        for sign in (1.0, -1.0):
+            low, high = quadratic_range(sign * b[:, None], sign * Q[:, None], r)
+            exact_low, exact_high = exact_range(sign * b, sign * Q, r)
+            rounding = 100 * 2.0**-53 * 12  # the caller's margin, as above
+            assert low[0] <= float(exact_low) + rounding
+            assert high[0] >= float(exact_high) - rounding
+            assert low[0] >= float(exact_low) - SLACK
+            assert high[0] <= float(exact_high) + SLACK
