@@ -1,0 +1,184 @@
+"""Plant, sensors and controller together: one simulated run."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from modrob_cli.arrays import Array
+from modrob_cli.errors import UsageError
+from modrob_cli.model.robot import Robot
+from modrob_cli.model.scenario import Scenario
+from modrob_cli.model.trajectory import Trajectory
+from modrob_cli.simulate.controllers.interface import Controller, Desired
+from modrob_cli.simulate.plant import Plant, State
+from modrob_cli.simulate.recording import EnergyBalance, Recorder, Run
+from modrob_cli.simulate.sensors import SensorBank
+from modrob_cli.simulate.truth import TrueRobot
+
+MOST_STEPS = 20_000_000
+"""Commands of one run; more would be a slip in the rate or the duration."""
+FASTEST = 1e4
+"""No joint is that fast [rad/s or m/s]: the closed loop has run away and the run ends."""
+
+_LOOKS = 200
+"""How often progress is told and energy is checked."""
+_SAME = 1e-6
+
+
+@dataclass
+class ClosedLoop:
+    """One arm, one motion, one controller, ready to run.
+
+    Attributes
+    ----------
+    robot : as its file describes it; its limits count
+    effort_factor : logged effort per joint torque of the motor, shape (n,)
+    rng : for the noise of the sensors
+
+    Raises
+    ------
+    UsageError
+        If the clocks do not fit together.
+    """
+
+    robot: Robot
+    truth: TrueRobot
+    trajectory: Trajectory
+    controller: Controller
+    scenario: Scenario
+    effort_factor: Array
+    rng: np.random.Generator
+
+    def __post_init__(self) -> None:
+        """Lay out the clocks."""
+        rate = self.scenario.control.rate
+        self._period = 1.0 / rate
+        self._every = samples_every(self.scenario)
+        steps = self.trajectory.duration * rate
+        if not steps <= MOST_STEPS:
+            raise UsageError(f"{steps:.3g} commands in one run, at most {MOST_STEPS:.0e}; expected a lower rate")
+        self._steps = max(int(np.floor(steps + _SAME)), 1)
+
+    def run(self, progress: Callable[[float], None] | None = None) -> Run:
+        """Simulate the whole motion, or up to where the closed loop runs away.
+
+        Parameters
+        ----------
+        progress : is told the part of the motion that is done
+
+        Raises
+        ------
+        UsageError
+            If the controller gives something else than a torque for each joint.
+        NumericalError
+            If the true robot has an inertia that is not positive.
+        """
+        with np.errstate(all="ignore"):  # a loop that runs away overflows; it is found out at once
+            return self._run(progress or (lambda _: None))
+
+    def _run(self, progress: Callable[[float], None]) -> Run:
+        scenario, dof = self.scenario, self.robot.dof
+        plant = Plant(self.truth, scenario.contacts, scenario.end_stops)
+        times = np.minimum(np.arange(self._steps + 1) * self._period, self.trajectory.duration)
+        desired = self.trajectory.sample(times, 2)
+        samples = self._steps // self._every + 1
+        bank = SensorBank(scenario.sensors, self._every * self._period, samples, self.effort_factor, self.rng)
+        recorder, state = Recorder(samples, dof), self._start(desired[0])
+        balance, look = EnergyBalance(plant, state), max(self._steps // _LOOKS, 1)
+        low, high = torque_limits(self.robot) if scenario.saturation else (np.full(dof, -np.inf), np.full(dof, np.inf))
+        cut, applied, diverged = np.zeros(dof), None, None
+        h = self._period / scenario.sub_steps
+        for k, t in enumerate(times.tolist()):
+            state.t = t
+            sampled = k % self._every == 0
+            if sampled:
+                bank.measure(state.q, state.dq)
+            commanded = self._command(t, *bank.delayed(), Desired(*desired[k]))
+            before, applied = applied, np.minimum(np.maximum(commanded, low), high)
+            cut += applied != commanded
+            if not (np.abs(state.dq).max() < FASTEST and np.isfinite(commanded).all()):
+                diverged = t
+                break
+            if sampled:
+                self._record(recorder, plant, state, bank, desired[k], commanded, applied, before)
+            if k == self._steps:
+                break
+            for _ in range(scenario.sub_steps):
+                plant.advance(state, applied, h)
+            if k % look == 0:
+                balance.check(state)
+                progress(k / self._steps)
+        if diverged is None:
+            balance.check(state)
+        progress(1.0)
+        recording = recorder.recording(bank.jitter)
+        return Run(self.truth, recording, diverged, cut / (k + 1), tuple(plant.hits), balance.relative_error())
+
+    def _start(self, first: Array) -> State:
+        """State at the beginning; ``first`` is the desired one, shape (3, n)."""
+        given = (self.scenario.initial_q, self.scenario.initial_dq)
+        q, dq = (np.array(first[k] if value is None else value) for k, value in enumerate(given))
+        return State(0.0, q, dq)
+
+    def _command(self, t: float, q: Array, dq: Array, desired: Desired) -> Array:
+        try:
+            command = np.array(self.controller.torque(t, q, dq, desired), dtype=float)
+        except (TypeError, ValueError) as error:
+            raise UsageError(f"the controller failed at t = {t:.6g} s: {error}") from error
+        if command.shape != (self.robot.dof,):
+            found = f"an array of shape {command.shape}"
+            raise UsageError(f"the controller gave {found}, expected {self.robot.dof} torques")
+        return command
+
+    def _record(
+        self,
+        recorder: Recorder,
+        plant: Plant,
+        state: State,
+        bank: SensorBank,
+        desired: Array,
+        commanded: Array,
+        applied: Array,
+        before: Array | None,
+    ) -> None:
+        """Record one sample; the motor still gives the torque of the command before when its effort is measured."""
+        ddq = plant.accelerations(state, applied)
+        external = plant.external_torque(state)
+        friction = applied + external - plant.dynamics.inverse(state.q, state.dq, ddq)
+        true = {"q": state.q, "dq": state.dq, "ddq": ddq, "friction": friction, "external": external}
+        q_measured, dq_measured = bank.latest
+        effort = bank.measure_effort(applied if before is None else before)
+        measured = {"q_measured": q_measured, "dq_measured": dq_measured, "effort": effort}
+        recorder.add(state.t, desired, **true, **measured, commanded=commanded, applied=applied)
+
+
+def samples_every(scenario: Scenario) -> int:
+    """Commands per sample of the sensors.
+
+    Raises
+    ------
+    UsageError
+        If the rate of the commands is no multiple of that of the sensors.
+    """
+    rate, control = scenario.sensors.rate, scenario.control.rate
+    ratio = 1.0 if rate is None else control / rate
+    every = round(ratio)
+    if every < 1 or abs(ratio - every) > _SAME * ratio:
+        message = f"found sensors at {rate:g} Hz and a controller at {control:g} Hz"
+        raise UsageError(f"{message}, expected the rate of the controller to be a multiple of that of the sensors")
+    return every
+
+
+def torque_limits(robot: Robot) -> tuple[Array, Array]:
+    """Lower and upper limit of the motor torque at each joint, from torque and current limits; infinite if unknown."""
+    ranges = []
+    for joint in robot.joints:
+        low, high = joint.limits.torque or (-np.inf, np.inf)
+        constant, current = joint.drive.torque_constant, joint.limits.current
+        if current is not None and constant is not None:
+            ends = sorted(float(constant * joint.drive.gear_ratio * end) for end in current)
+            low, high = max(low, ends[0]), min(high, ends[1])
+        ranges.append((low, high))
+    ends_of = np.array(ranges)
+    return ends_of[:, 0], ends_of[:, 1]

@@ -1,0 +1,1 @@
+"""Controllers of joint torque behind one small interface."""

@@ -1,0 +1,97 @@
+"""What every controller is: a function of time, measured and desired state that gives joint torques."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from modrob_cli.arrays import Array
+from modrob_cli.errors import UsageError
+from modrob_cli.model.scenario import Control, GainValue
+from modrob_cli.model.trajectory import Trajectory
+from modrob_cli.simulate.control_model import ControlModel
+
+
+class Desired(NamedTuple):
+    """Where the motion wants the arm to be: position, velocity, acceleration, shape (n,) each."""
+
+    q: Array
+    dq: Array
+    ddq: Array
+
+
+class Controller(Protocol):
+    """One controller for one run; it may keep a state of its own between calls."""
+
+    def torque(self, t: float, q: Array, dq: Array, desired: Desired) -> Array:
+        """Motor torque at the joints until the next call, shape (n,), [N m] or [N].
+
+        Parameters
+        ----------
+        t : time since the start [s]; calls come at 0, T, 2 T, ...
+        q, dq : measured position and velocity, shape (n,)
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class ControlTask:
+    """What a controller is made from.
+
+    Attributes
+    ----------
+    model : nominal robot
+    trajectory : the planned motion
+    period : time between two commands [s]
+    control : gains, and how friction is compensated
+    """
+
+    model: ControlModel
+    trajectory: Trajectory
+    period: float
+    control: Control
+
+    def gain(self, name: str, default: GainValue | None = None) -> Array:
+        """One gain for each joint, shape (n,).
+
+        Raises
+        ------
+        UsageError
+            If it is not given and has no default, or has another number of values than the robot has joints.
+        """
+        value = self.control.gains.get(name, default)
+        if value is None:
+            raise UsageError(
+                f"controller: the gain {name} is missing; give it in the scenario or with --gain {name}=..."
+            )
+        values = np.asarray(value, dtype=float)
+        if values.ndim and len(values) != self.model.dof:
+            raise UsageError(f"controller: gain {name}: found {len(values)} values for {self.model.dof} joints")
+        if not np.isfinite(values).all():
+            raise UsageError(f"controller: gain {name}: expected finite numbers")
+        return np.array(np.broadcast_to(values, (self.model.dof,)))
+
+    def check_gains(self, known: Sequence[str]) -> None:
+        """Make sure that every gain that is given is known.
+
+        Raises
+        ------
+        UsageError
+            If one is not.
+        """
+        unknown = [name for name in self.control.gains if name not in known]
+        if unknown:
+            raise UsageError(f"controller: found the gain {', '.join(unknown)}, expected some of {', '.join(known)}")
+
+    def sign(self, dq: Array) -> Array:
+        """Direction of motion, shape (n,), with a straight line within the friction band."""
+        band = self.control.friction_band
+        return np.clip(dq / band, -1.0, 1.0) if band > 0.0 else np.sign(dq)
+
+    def friction(self, dq: Array, desired_dq: Array) -> Array:
+        """Nominal viscous and Coulomb friction that the controller compensates, shape (n,)."""
+        if self.control.friction == "none":
+            return np.zeros(self.model.dof)
+        velocity = dq if self.control.friction == "measured" else desired_dq
+        return np.asarray(self.model.viscous * velocity + self.model.coulomb * self.sign(velocity))
