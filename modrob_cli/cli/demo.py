@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from modrob_cli.cli import simulate, validate
 from modrob_cli.cli.assemble import show_robot, summary_table
 from modrob_cli.cli.bounds import say_result
 from modrob_cli.cli.check import summary_line
@@ -19,7 +20,7 @@ _DEFAULT = Path("out/demo")
 
 
 def demo(out: OutDir = _DEFAULT, overwrite: Overwrite = False) -> None:
-    """Run the whole chain on the shipped example: check, assemble, draw, bound torques."""
+    """Run the whole chain on the shipped example: check, assemble, draw, bound torques, simulate, validate."""
     from modrob_cli.workflows import demo as workflow
 
     result = workflow.demo(out, overwrite, announce=lambda step: say(f"\n{step}"))
@@ -40,8 +41,13 @@ def _report(result: "DemoResult", main: str, uncertain: str) -> None:
     say("\nThe torques of the arm along Table B.1 of the dissertation, for every last link of")
     say("1.5 to 3 kg that its file admits (the published motion is slightly too fast for one joint):\n")
     say_result(result.bounds)
+    say("\nThe arm follows the same motion with a payload of 2 kg that its controller does not know of:")
+    simulate.say_result(result.simulated)
+    say("\nThe log against the model without the payload: a misfit beyond the noise shows that something is missing.\n")
+    for log in result.validated["logs"]:
+        validate.say_log(log)
     say(f"\nEverything is in {result.folder}/; {result.folder}/README.md says what each file is.")
-    say(f"Look at {result.folder}/pose/{main}.png and {result.folder}/bounds/*.png first.")
+    say(f"Look at {result.folder}/pose/{main}.png and the pictures in bounds/, simulated/ and validated/ first.")
 
 
 def _widening(robot: "AssembledRobot") -> str:

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
 from modrob_cli.arrays import Array, frozen
 from modrob_cli.model.body import RigidBody
 
@@ -68,10 +70,15 @@ class Contact:
         """Time from which on the force is zero again, [s]."""
         return self.start + self.duration
 
+    def size(self, t: Array) -> Array:
+        """Force at times t, relative to its largest; 0 outside the window. Shape of t."""
+        shape = np.ones_like(t) if self.shape == "constant" else np.sin(np.pi * (t - self.start) / self.duration)
+        return np.where((t >= self.start) & (t < self.end), shape, 0.0)
+
 
 @dataclass(frozen=True)
 class Channel:
-    """One kind of measurement.
+    """One kind of measurement; a number for all joints, or one for each.
 
     Attributes
     ----------
@@ -79,8 +86,8 @@ class Channel:
     resolution : step of the quantisation, 0 for none; what is measured is rounded to a multiple of it
     """
 
-    noise: float = 0.0
-    resolution: float = 0.0
+    noise: GainValue = 0.0
+    resolution: GainValue = 0.0
 
 
 @dataclass(frozen=True)

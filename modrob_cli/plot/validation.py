@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modrob_cli.arrays import Array
+from modrob_cli.plot.thinning import thin
 
 RECORDED, PREDICTED, RESIDUAL = "#9aa0a6", "#0b57d0", "#c5221f"
-MAX_POINTS = 6000
-"""More samples than the picture has pixels are thinned out to their extremes."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +55,8 @@ def draw_torques(picture: TorquePicture, path: Path) -> None:
             (picture.recorded[:, j], RECORDED, 1.3, "recorded"),
             (picture.predicted[:, j], PREDICTED, 1.0, "predicted"),
         ):
-            left.plot(*_thin(picture.t, series), color=color, linewidth=width, label=label)
-        right.plot(*_thin(picture.t, residual[:, j]), color=RESIDUAL, linewidth=0.9, label="recorded - predicted")
+            left.plot(*thin(picture.t, series), color=color, linewidth=width, label=label)
+        right.plot(*thin(picture.t, residual[:, j]), color=RESIDUAL, linewidth=0.9, label="recorded - predicted")
         left.set_ylabel(f"torque [{picture.units[j]}]" if picture.units[j] == "N m" else f"force [{picture.units[j]}]")
         # Names come from files: $ would start a formula. With y given, Matplotlib skips a slow search for a free place.
         left.set_title(picture.names[j].replace("$", r"\$"), loc="left", y=1.0, fontsize=10, fontweight="bold")
@@ -87,16 +86,3 @@ def _shade(axis: object, picture: TorquePicture) -> None:
     for start, end in edges.reshape(-1, 2):
         last = min(end, len(picture.t) - 1)
         axis.axvspan(picture.t[start], picture.t[last], color="#f1f3f4", zorder=0, linewidth=0)  # type: ignore[attr-defined]
-
-
-def _thin(t: Array, x: Array) -> tuple[Array, Array]:
-    """Keep the smallest and the largest of each run of samples, so that no peak is lost."""
-    size = -(-len(x) // (MAX_POINTS // 2))
-    if size <= 2:
-        return t, x
-    whole = len(x) // size * size
-    runs = x[:whole].reshape(-1, size)
-    offsets = np.arange(len(runs)) * size
-    picks = np.concatenate([offsets + runs.argmin(axis=1), offsets + runs.argmax(axis=1), [len(x) - 1]])
-    picks = np.unique(picks)
-    return t[picks], x[picks]

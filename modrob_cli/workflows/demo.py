@@ -7,16 +7,21 @@ from typing import Any
 
 from modrob_cli.io.catalogue import yaml_files
 from modrob_cli.io.outputs import OutputFolder
-from modrob_cli.io.shipped import shipped_folder
+from modrob_cli.io.shipped import SHIPPED_FOLDERS, shipped_folder
 from modrob_cli.workflows.assemble import AssembledRobot, assemble
 from modrob_cli.workflows.bounds import bounds
 from modrob_cli.workflows.bounds_method import BoundsOptions
 from modrob_cli.workflows.check import CheckResult, check
+from modrob_cli.workflows.simulate import simulate
+from modrob_cli.workflows.simulation_study import SimulateOptions
+from modrob_cli.workflows.trajectory import trajectory
+from modrob_cli.workflows.validate import ValidateOptions, validate
 
 MAIN_ROBOT = "lwa4p-6"
 UNCERTAIN_ROBOT = "lwa4p-6-tol5"
 PAYLOAD_ROBOT = "lwa4p-table34"
 MOTION = "table-b1"
+SCENARIO = "payload"
 POSE = (0.3, -0.8, 1.6, 0.0, 0.8, 0.0)
 
 _GUIDE = """# What `modrob demo` left here
@@ -35,8 +40,13 @@ _GUIDE = """# What `modrob demo` left here
 | `bounds/{motion}.bounds.csv` | the same as numbers |
 | `bounds/{motion}.shares.csv` | how much each uncertain parameter widens the bounds |
 | `bounds/{motion}.bounds.json` | the result with versions and hashes |
+| `motion/{motion}.png` | the motion: position, velocity, acceleration, and the limits of the arm |
+| `motion/{motion}.csv`, `motion/{motion}.mcap` | its samples |
+| `simulated/payload.mcap` | a simulated run with 2 kg that the controller does not know of; PlotJuggler opens it |
+| `simulated/payload.simulate.png` | how well the arm followed, and the motor torques |
+| `validated/payload.validate.png` | recorded torque against that of the model without the 2 kg |
 
-The inputs are the shipped `modules/`, `assemblies/` and `trajectories/`;
+The inputs are the shipped `modules/`, `assemblies/`, `trajectories/` and `scenarios/`;
 `modrob init DIR` copies them into a workspace of your own.
 """
 
@@ -48,6 +58,8 @@ class DemoResult:
     checked: CheckResult
     robots: list[AssembledRobot]
     bounds: dict[str, Any]
+    simulated: dict[str, Any]
+    validated: dict[str, Any]
     folder: Path
 
     def robot(self, name: str) -> AssembledRobot:
@@ -56,7 +68,7 @@ class DemoResult:
 
 
 def demo(out: Path, overwrite: bool, announce: Callable[[str], None]) -> DemoResult:
-    """Check the shipped documents, assemble the shipped arms, draw one, bound its torques along a motion.
+    """Check the shipped documents, assemble the shipped arms, draw one, bound its torques, simulate and validate it.
 
     ``announce`` is told each step.
 
@@ -65,9 +77,9 @@ def demo(out: Path, overwrite: bool, announce: Callable[[str], None]) -> DemoRes
     OutputExistsError
         If files are there and ``overwrite`` is false.
     """
-    modules, assemblies, trajectories = (shipped_folder(name) for name in ("modules", "assemblies", "trajectories"))
-    announce("1. Check the shipped catalogue: modrob check modules assemblies trajectories")
-    checked = check([modules, assemblies, trajectories])
+    modules, assemblies, trajectories, scenarios = (shipped_folder(name) for name in SHIPPED_FOLDERS)
+    announce(f"1. Check the shipped catalogue: modrob check {' '.join(SHIPPED_FOLDERS)}")
+    checked = check([modules, assemblies, trajectories, scenarios])
     paths = list(yaml_files(assemblies))
     announce(f"2. Assemble the {len(paths)} shipped arms: modrob assemble assemblies/*.yaml -o {out}/robots")
     robots = assemble(paths, out / "robots", overwrite=overwrite)
@@ -78,6 +90,22 @@ def demo(out: Path, overwrite: bool, announce: Callable[[str], None]) -> DemoRes
     payload, motion = assemblies / f"{PAYLOAD_ROBOT}.yaml", trajectories / f"{MOTION}.yaml"
     announce(f"4. Bound its torques along a motion: modrob bounds {payload.name} {motion.name} -o {out}/bounds")
     found = bounds(payload, motion, BoundsOptions(), out / "bounds", overwrite)
+    simulated, validated = _simulate_and_validate(main, motion, out, overwrite, announce)
     with OutputFolder(out, overwrite) as folder:
         folder.write("README.md", _GUIDE.replace("{main}", MAIN_ROBOT).replace("{motion}", MOTION))
-    return DemoResult(checked, robots, found, out)
+    return DemoResult(checked, robots, found, simulated, validated, out)
+
+
+def _simulate_and_validate(
+    robot: Path, motion: Path, out: Path, overwrite: bool, announce: Callable[[str], None]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Sample the motion, let the arm follow it with a payload, compare the log with the model."""
+    announce(f"5. Sample the motion: modrob trajectory {motion.name} --robot {robot.name} -o {out}/motion")
+    trajectory(motion, robot, out / "motion", overwrite=overwrite)
+    scenario, log = shipped_folder("scenarios") / f"{SCENARIO}.yaml", out / "simulated" / f"{SCENARIO}.mcap"
+    files = f"{robot.name} {motion.name} --scenario {scenario.name}"
+    announce(f"6. Simulate it with a payload: modrob simulate {files} -o {log}")
+    simulated = simulate(robot, motion, SimulateOptions(scenario=scenario), log, overwrite)
+    announce(f"7. Validate the model with the log: modrob validate {robot.name} {log} --effort torque")
+    validated = validate(robot, [log], ValidateOptions("torque"), out / "validated", overwrite)
+    return simulated, validated

@@ -1,0 +1,1 @@
+"""Reports: one self-contained HTML file that a person can read, print and sign."""
