@@ -14,10 +14,10 @@ from modrob_cli.cli.options import DEFAULT_OUT, AsJson, OutDir, Overwrite, numbe
 _HELP = """Bound the joint torques along a motion, for every admissible value of every uncertain parameter.
 
 ROBOT is an assembly, a robot file or a URDF. MOTION is a CSV file t,q1..qN,dq1..dqN,ddq1..ddqN in joint order, or with
-q.NAME, dq.NAME, ddq.NAME for joints by name; or a trajectory document (*.yaml), which is sampled. The bounds are exact
-(no admissible parameters give more, some give as much) and hold in spite of rounding. Writes MOTION.bounds.csv,
-.bounds.json, .bounds.png, and MOTION.shares.csv: which parameters make the bounds wide, so which to measure better
-first.
+q.NAME, dq.NAME, ddq.NAME for joints by name; or another motion as modrob trajectory takes it (*.yaml, *.json, *.mcap),
+which is sampled. The bounds are exact (no admissible parameters give more, some give as much) and hold in spite of
+rounding. Writes MOTION.bounds.csv, .bounds.json, .bounds.png, and MOTION.shares.csv: which parameters make the bounds
+wide, so which to measure better first.
 """
 
 _EPILOG = "Example: modrob bounds assemblies/lwa4p-6-payload.yaml motion.csv --ddq-tolerance 0.1 -o out/bounds"
@@ -43,7 +43,7 @@ def register(app: typer.Typer) -> None:
 
 def _bounds(
     robot: Annotated[Path, typer.Argument(metavar="ROBOT", help="Assembly, robot file or URDF.")],
-    motion: Annotated[Path, typer.Argument(metavar="MOTION", help="Sampled motion (CSV) or trajectory document.")],
+    motion: Annotated[Path, typer.Argument(metavar="MOTION", help="Motion: CSV, YAML, JSON or MCAP.")],
     out: OutDir = DEFAULT_OUT,
     method: Annotated[Method, typer.Option(help=_METHOD_HELP)] = Method.exact,
     ddq_tolerance: Annotated[
@@ -58,8 +58,9 @@ def _bounds(
     ] = None,
     rate: Annotated[
         float | None,
-        typer.Option(metavar="HZ", help="Samples per second of a trajectory document; 100 where left out."),
+        typer.Option(metavar="HZ", help="Samples per second of a MOTION that is not CSV; 100 where left out."),
     ] = None,
+    topic: Annotated[str | None, typer.Option(metavar="NAME", help="Topic of an MCAP file with several.")] = None,
     as_json: AsJson = False,
     overwrite: Overwrite = False,
 ) -> None:
@@ -73,7 +74,7 @@ def _bounds(
         numbers(dq_noise, "--dq-noise"),
     )
     with _progress() as report:
-        result = bounds(robot, motion, options, out, overwrite, report, rate)
+        result = bounds(robot, motion, options, out, overwrite, report, rate, topic)
     say_result(result)
     if as_json:
         print_json(result)
@@ -97,6 +98,8 @@ def _progress() -> Iterator[Callable[[float], None]]:
 
 def say_result(result: dict[str, Any]) -> None:
     """Print the table of joints and what makes their bounds wide."""
+    for text in result["motion_warnings"]:
+        say(f"warning: {text}")
     for warning in result["warnings"]:
         say(f"warning: {warning['message']}")
     span = f"t = {result['start']:.6g} .. {result['end']:.6g} s"

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modrob_cli.arrays import Array
+from modrob_cli.arrays import Array, Indices
 from modrob_cli.dynamics.link_motion import JointPosition, Motion
 from modrob_cli.dynamics.vectors import apply, cross, dot
 
@@ -51,9 +51,13 @@ class BodyTerms:
     y: Array
     B: Array
 
-    def times(self, factor: float) -> "BodyTerms":
-        """Coefficients times a number (torque is linear in them)."""
+    def times(self, factor: float | Array) -> "BodyTerms":
+        """Coefficients times a number, or one for each sample (T,); torque is linear in them."""
         return BodyTerms(factor * self.y0, factor * self.y, factor * self.B)
+
+    def of_samples(self, which: Indices) -> "BodyTerms":
+        """Coefficients at some of the samples."""
+        return BodyTerms(self.y0[which], self.y[:, which], self.B[:, which])
 
     def __add__(self, other: "BodyTerms") -> "BodyTerms":
         """Sum of coefficients."""

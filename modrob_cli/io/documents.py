@@ -67,11 +67,26 @@ def check_document(loaded: YamlDocument, expected: type[Document] | None = None)
         raise InputFileError(_faults(error, loaded, kind)) from error
 
 
-def _faults(error: ValidationError, loaded: YamlDocument, kind: type[Document]) -> list[Fault]:
+def check_part(loaded: YamlDocument, path: Path_, kind: type[D]) -> D:
+    """Check the part of YAML data at a path, which exists, against a kind without the key ``modrob``.
+
+    Raises
+    ------
+    InputFileError
+        With all faults of the part.
+    """
+    part = functools.reduce(lambda node, step: node[step], path, loaded.data)
+    try:
+        return kind.model_validate(part)
+    except ValidationError as error:
+        raise InputFileError(_faults(error, loaded, kind, path)) from error
+
+
+def _faults(error: ValidationError, loaded: YamlDocument, kind: type[Document], base: Path_ = ()) -> list[Fault]:
     faults = []
     for item in error.errors(include_url=False):
-        path = _known_path(item["loc"], loaded, missing=item["type"] == "missing")
-        faults.append(loaded.fault(path, _message(dict(item), path, kind)))
+        path = _known_path((*base, *item["loc"]), loaded, missing=item["type"] == "missing")
+        faults.append(loaded.fault(path, _message(dict(item), path[len(base) :], kind)))
     return first_faults(sorted(dict.fromkeys(faults), key=lambda fault: (fault.line or 0, fault.column or 0)))
 
 

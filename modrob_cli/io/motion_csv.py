@@ -49,26 +49,13 @@ class MotionCsv:
             If it cannot be read, its columns do not fit the robot, something in it is not a finite number, its
             times do not increase, or it has no samples; possibly after the pieces before the fault were given.
         """
-        with self._open() as stream:
+        with open_csv(self.path) as stream:
             yield from self._pieces(stream, max(self.path.stat().st_size, 1))
 
-    def _open(self) -> BinaryIO:
-        name = str(self.path)
-        try:
-            if self.path.is_dir():
-                raise InputFileError(Fault(name, "found a folder, expected a CSV file"))
-            if not self.path.is_file():
-                what = "is not a regular file" if self.path.exists() else "file not found"
-                raise InputFileError(Fault(name, f"{what}; check the path"))
-            return self.path.open("rb")
-        except (OSError, ValueError) as error:
-            reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-            raise InputFileError(Fault(name, f"cannot be read: {reason}")) from error
-
     def _pieces(self, stream: BinaryIO, size: int) -> Iterator[MotionPiece]:
-        header = self._header(stream)
+        header = read_header(str(self.path), stream)
         order = column_order(str(self.path), header, self.joint_names)
-        table = _Table(str(self.path), header)
+        table = NumberTable(str(self.path), header)
         n = len(self.joint_names)
         for lines, values in table.blocks(stream):
             values = values[:, order]
@@ -79,28 +66,55 @@ class MotionCsv:
             message = "found no samples, expected at least one line of numbers after the header"
             raise InputFileError(Fault(str(self.path), message))
 
-    def _header(self, stream: BinaryIO) -> list[str]:
-        """Names of the columns, from the first line."""
-        name = str(self.path)
-        raw = stream.readline(LONGEST_LINE).removeprefix(_BOM)
-        if not raw.strip():
-            what = "an empty first line" if raw else "an empty file"
-            raise InputFileError(Fault(name, f"found {what}, expected a header: t,q1,...,dq1,...,ddq1,...", line=1))
-        if len(raw) >= LONGEST_LINE:
-            message = f"found more than {LONGEST_LINE} bytes in one line, expected a header: t,q1,..."
-            raise InputFileError(Fault(name, message, line=1))
-        text = _decoded(name, raw, 1).strip()
-        if "\r" in text:
-            message = "found lines that end with CR alone, expected LF or CR LF; save the file with other line ends"
-            raise InputFileError(Fault(name, message, line=1))
-        try:
-            return [cell.strip() for cell in next(csv.reader([text], skipinitialspace=True))]
-        except csv.Error as error:
-            message = f"found a header that is not a line of CSV ({error}), expected t,q1,...,dq1,...,ddq1,..."
-            raise InputFileError(Fault(name, message, line=1)) from error
+
+def open_csv(path: Path) -> BinaryIO:
+    """Open a file.
+
+    Raises
+    ------
+    InputFileError
+        If it is none or cannot be opened.
+    """
+    name = str(path)
+    try:
+        if path.is_dir():
+            raise InputFileError(Fault(name, "found a folder, expected a CSV file"))
+        if not path.is_file():
+            what = "is not a regular file" if path.exists() else "file not found"
+            raise InputFileError(Fault(name, f"{what}; check the path"))
+        return path.open("rb")
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise InputFileError(Fault(name, f"cannot be read: {reason}")) from error
 
 
-class _Table:
+def read_header(name: str, stream: BinaryIO) -> list[str]:
+    """Names of the columns, from the first line.
+
+    Raises
+    ------
+    InputFileError
+        If it is no header.
+    """
+    raw = stream.readline(LONGEST_LINE).removeprefix(_BOM)
+    if not raw.strip():
+        what = "an empty first line" if raw else "an empty file"
+        raise InputFileError(Fault(name, f"found {what}, expected a header: t,q1,...,dq1,...,ddq1,...", line=1))
+    if len(raw) >= LONGEST_LINE:
+        message = f"found more than {LONGEST_LINE} bytes in one line, expected a header: t,q1,..."
+        raise InputFileError(Fault(name, message, line=1))
+    text = _decoded(name, raw, 1).strip()
+    if "\r" in text:
+        message = "found lines that end with CR alone, expected LF or CR LF; save the file with other line ends"
+        raise InputFileError(Fault(name, message, line=1))
+    try:
+        return [cell.strip() for cell in next(csv.reader([text], skipinitialspace=True))]
+    except csv.Error as error:
+        message = f"found a header that is not a line of CSV ({error}), expected t,q1,...,dq1,...,ddq1,..."
+        raise InputFileError(Fault(name, message, line=1)) from error
+
+
+class NumberTable:
     """Lines of numbers below a header."""
 
     def __init__(self, file: str, header: list[str]) -> None:

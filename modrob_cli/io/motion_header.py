@@ -18,32 +18,55 @@ _NUMBER = re.compile(r"[+-]?[0-9.]+([eE][+-]?[0-9]+)?")
 _SHOWN = 12
 
 
-def column_order(file: str, header: Sequence[str], joint_names: Sequence[str]) -> Indices:
+def column_order(
+    file: str, header: Sequence[str], joint_names: Sequence[str], kinds: Sequence[str] = tuple(KINDS)
+) -> Indices:
     """Indices of the columns t, q, dq, ddq in the order of the robot's joints, shape (1 + 3 n,).
+
+    Parameters
+    ----------
+    kinds : which of q, dq, ddq are expected
 
     Raises
     ------
     InputFileError
         With everything that is wrong with the header.
     """
-    messages = list(_faults(header, joint_names))
+    messages = list(_faults(header, joint_names, kinds))
     if messages:
         raise InputFileError([Fault(file, message, line=1) for message in messages])
-    keys = _keys(header, joint_names)
+    keys = _keys(header, joint_names, kinds)
     return np.array([header.index(name) for name in keys])
 
 
-def _keys(header: Sequence[str], joint_names: Sequence[str]) -> list[str]:
+def joints_of(header: Sequence[str]) -> tuple[str, ...] | None:
+    """Joints that a header names, in the order of their positions; None if it counts them or has none."""
+    return tuple(match[2] for name in header if (match := _BY_NAME.fullmatch(name)) and match[1] == "q") or None
+
+
+def count_of(header: Sequence[str]) -> int:
+    """Number of columns of positions that a header counts, at least 1."""
+    return max(sum(_BY_NUMBER.fullmatch(name) is not None and name[0] == "q" for name in header), 1)
+
+
+def kinds_of(header: Sequence[str]) -> list[str]:
+    """Which of q, dq, ddq a header has, q always; dq too where it has ddq."""
+    matches = (_BY_NAME.fullmatch(name) or _BY_NUMBER.fullmatch(name) for name in header)
+    found = {match[1] for match in matches if match}
+    return ["q", *(["dq"] if found & {"dq", "ddq"} else []), *(["ddq"] if "ddq" in found else [])]
+
+
+def _keys(header: Sequence[str], joint_names: Sequence[str], kinds: Sequence[str]) -> list[str]:
     """Names that the columns should have, in the style (by name or by number) that the header uses."""
     by_name = any(_BY_NAME.fullmatch(name) for name in header)
     labels = [f".{name}" for name in joint_names] if by_name else [str(k + 1) for k in range(len(joint_names))]
-    return ["t", *(f"{kind}{label}" for kind in KINDS for label in labels)]
+    return ["t", *(f"{kind}{label}" for kind in kinds for label in labels)]
 
 
-def _faults(header: Sequence[str], joint_names: Sequence[str]) -> list[str]:
+def _faults(header: Sequence[str], joint_names: Sequence[str], kinds: Sequence[str]) -> list[str]:
     n = len(joint_names)
     last = "" if n == 1 else f"..{{}}{n}"
-    form = ",".join(["t", *(f"{kind}1{last.format(kind)}" for kind in KINDS)])
+    form = ",".join(["t", *(f"{kind}1{last.format(kind)}" for kind in kinds)])
     if len(header) == 1 and ";" in header[0]:
         return [f"found semicolons between the columns, expected commas: {form}"]
     if all(_NUMBER.fullmatch(name) for name in header):
@@ -51,7 +74,7 @@ def _faults(header: Sequence[str], joint_names: Sequence[str]) -> list[str]:
     repeated = [name for name, count in Counter(header).items() if count > 1]
     if repeated:
         return [f"found repeated columns: {_list(repeated)}; expected each once"]
-    wanted = _keys(header, joint_names)
+    wanted = _keys(header, joint_names, kinds)
     missing = [name for name in wanted if name not in header]
     unknown = [name for name in header if name not in wanted]
     if not missing and not unknown:

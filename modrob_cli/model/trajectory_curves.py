@@ -13,6 +13,8 @@ MOST_DERIVED = 4
 """Derivatives are known up to this order."""
 DIVISIONS = 32
 """Parts of a period, or of a piece of polynomial, that are looked at one by one in search of extremes."""
+FEWEST_DIVISIONS, MOST_PARTS = 4, 2**15
+"""Of a curve of very many pieces (samples) each one is short and is divided less, into 4 parts at least."""
 
 
 class Curve(Protocol):
@@ -68,7 +70,7 @@ class PiecewiseCurve:
     @property
     def divisions(self) -> int:
         """Parts of a piece: it has at most one period of the cosine, or a few turns of the polynomial."""
-        return DIVISIONS
+        return int(np.clip(MOST_PARTS // len(self.ripple), FEWEST_DIVISIONS, DIVISIONS))
 
     def derivative(self, t: Array, order: int, before: bool = False) -> Array:
         """Derivative of the given order at times t, as :class:`Curve` says."""
@@ -81,6 +83,8 @@ class PiecewiseCurve:
         out = np.zeros_like(s)
         for k in range(derived.shape[1] - 1, -1, -1):  # Horner
             out = out * s + derived[piece, k]
+        if not self.ripple.any():
+            return np.asarray(out / length**order)
         w = 2.0 * math.pi
         wave = (np.cos(w * s), -np.sin(w * s))[order % 2] * (1.0, 1.0, -1.0, -1.0)[order % 4] * w**order
         out = out + self.ripple[piece] * ((1.0 if order == 0 else 0.0) - wave)

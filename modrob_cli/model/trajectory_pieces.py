@@ -1,4 +1,4 @@
-"""Curves through points: rest-to-rest polynomials, quintic splines, sin^2 profiles."""
+"""Curves through points: rest-to-rest polynomials, cubic and quintic splines, sin^2 profiles."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -51,6 +51,53 @@ def quintic_spline(t: Array, q: Array, dq: Array, ddq: Array) -> PiecewiseCurve:
         6.0 * step - 3.0 * v0 - 3.0 * v1 - 0.5 * a0 + 0.5 * a1,
     ]
     return PiecewiseCurve(t, np.stack(coefficients, axis=1), np.zeros(len(length)))
+
+
+def cubic_hermite(t: Array, q: Array, dq: Array) -> PiecewiseCurve:
+    """Polynomials of order 3 that meet position and velocity at each point; acceleration may jump there.
+
+    Parameters
+    ----------
+    t : increasing times from 0, shape (m + 1,), [s]
+    q, dq : shape (m + 1,), [rad] or [m] and derivative
+    """
+    length = np.diff(t)
+    step = np.diff(q)
+    v0, v1 = dq[:-1] * length, dq[1:] * length
+    coefficients = [q[:-1], v0, 3.0 * step - 2.0 * v0 - v1, -2.0 * step + v0 + v1]
+    return PiecewiseCurve(t, np.stack(coefficients, axis=1), np.zeros(len(length)))
+
+
+def spline_velocities(t: Array, q: Array) -> Array:
+    """Velocities at points, with which cubic polynomials through them have no jump of acceleration; zero at both ends.
+
+    The clamped cubic spline. At an inner point with the lengths h before and g after it, equal accelerations ask for
+    g v_before + 2 (g + h) v + h v_after = 3 (g s_before / h + h s_after / g) with the steps s of position.
+
+    Parameters
+    ----------
+    t : increasing times, shape (m + 1,), [s]
+    q : positions, shape (m + 1, n), [rad] or [m]
+
+    Returns
+    -------
+    velocities : shape (m + 1, n)
+    """
+    from scipy.linalg import solve_banded
+
+    out = np.zeros_like(q)
+    if len(t) < 3:
+        return out
+    length = np.diff(t)
+    before, after = length[:-1, None], length[1:, None]
+    step = np.diff(q, axis=0)
+    right = 3.0 * (after / before * step[:-1] + before / after * step[1:])
+    bands = np.zeros((3, len(t) - 2))
+    bands[0, 1:] = length[:-2]
+    bands[1] = 2.0 * (length[:-1] + length[1:])
+    bands[2, :-1] = length[2:]
+    out[1:-1] = solve_banded((1, 1), bands, right, check_finite=False)
+    return out
 
 
 def sin2_profiles(

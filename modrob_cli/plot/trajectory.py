@@ -69,7 +69,7 @@ def draw_trajectory(
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
     figure.align_ylabels(axes)
-    _head(figure, axes[0], labels, height, any(len(curve.knots) > 2 for curve in trajectory.curves))
+    _head(figure, axes[0], labels, height, any(2 < len(curve.knots) <= MOST_MARKS for curve in trajectory.curves))
     figure.savefig(path, format="png", metadata={"Software": None})
 
 

@@ -1,18 +1,20 @@
 """``trajectory/1``: a planned motion as a function of time."""
 
 import math
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from modrob_cli.arrays import Array
 from modrob_cli.model.trajectory import Trajectory
 from modrob_cli.model.trajectory_curves import Curve, SineCurve, sine_product
 from modrob_cli.model.trajectory_pieces import quintic_spline, rest_to_rest, sin2_profiles
 from modrob_cli.schema.base import Angle, Document, Name
-from modrob_cli.schema.trajectory_parts import FactorSpec, JointSinesSpec, PointSpec, point_faults
+from modrob_cli.schema.located import LocatedFault, raise_faults
+from modrob_cli.schema.trajectory_parts import FactorSpec, JointSinesSpec, PointSpec, joint_faults, point_faults
 
 MOST_PERIODS = 1e5
 """More periods than any motion has; keeps the search for extremes finite."""
@@ -26,7 +28,18 @@ _REQUIRED = {
 }
 _OPTIONAL = {"sines": ("base_frequency",)}
 _COMMON = {"modrob", "name", "kind", "source", "description"}
-_SHOWN = 10
+
+
+def _kind_rules() -> list[Any]:
+    """JSON Schema of the keys that each kind needs, and of those that it does not know."""
+    special = sorted({key for keys in (*_REQUIRED.values(), *_OPTIONAL.values()) for key in keys})
+    rules = []
+    for kind, required in _REQUIRED.items():
+        others = [key for key in special if key not in (*required, *_OPTIONAL.get(kind, ()))]
+        then = {"required": list(required), "properties": {key: {"type": "null"} for key in others}}
+        rules.append({"if": {"properties": {"kind": {"const": kind}}, "required": ["kind"]}, "then": then})
+    return rules
+
 
 Positive = Annotated[float, Field(gt=0.0)]
 PositiveAngle = Annotated[Angle, Field(gt=0.0)]
@@ -34,6 +47,8 @@ PositiveAngle = Annotated[Angle, Field(gt=0.0)]
 
 class TrajectoryDocument(Document):
     """A motion of all joints, base to tip, from t = 0 on. Which keys it has depends on its kind."""
+
+    model_config = ConfigDict(json_schema_extra={"allOf": _kind_rules()})
 
     modrob: Literal["trajectory/1"]
     name: Name
@@ -63,11 +78,7 @@ class TrajectoryDocument(Document):
         kind = info.data.get("kind")
         if points is None or "points" not in _REQUIRED.get(str(kind), ()):
             return points
-        faults = point_faults(str(kind), points)
-        if faults:
-            more = f"; and {len(faults) - _SHOWN} more faults" if len(faults) > _SHOWN else ""
-            message = "Input should have points that fit together: {faults}"
-            raise PydanticCustomError("points", message, {"faults": "; ".join(faults[:_SHOWN]) + more})
+        raise_faults("points", point_faults(str(kind), points))
         return points
 
     @model_validator(mode="after")
@@ -76,42 +87,32 @@ class TrajectoryDocument(Document):
         given = {key for key in self.model_fields_set if getattr(self, key) is not None} - _COMMON
         missing = [key for key in required if key not in given]
         wrong = sorted(given - {*required, *_OPTIONAL.get(self.kind, ())})
-        parts = [f"lacks {', '.join(missing)}"] if missing else []
-        parts += [f"has {', '.join(wrong)}, which this kind does not know"] if wrong else []
-        if parts:
-            message = "Input should have {keys} for kind {kind}; it {parts}"
-            values = {"keys": " and ".join(required), "kind": self.kind, "parts": " and ".join(parts)}
-            raise PydanticCustomError("kind", message, values)
-        for faults in (self._joint_faults(), self._sin2_faults()):
-            if faults:
-                raise PydanticCustomError("joints", "Input should fit together: {faults}", {"faults": faults})
+        keys = " and ".join(required)
+        faults = [LocatedFault((), f"Input should have {keys} for kind {self.kind}; it lacks {', '.join(missing)}", {})]
+        faults = faults if missing else []
+        for key in wrong:
+            message = f"Input should be nothing here: kind {self.kind} has {keys}, but no {key}"
+            faults.append(LocatedFault((key,), message, getattr(self, key)))
+        raise_faults("kind", faults)
+        raise_faults("parts", [*self._joint_faults(), *self._sin2_faults()])
         return self
 
-    def _joint_faults(self) -> str:
-        product = self.kind == "sine-products"
-        out = []
-        for k, joint in enumerate(self.joints or (), start=1):
-            if product != (joint.amplitude is not None):
-                out.append(f"joint {k} {'lacks' if product else 'has'} amplitude (kind {self.kind})")
-            if product and (joint.terms or joint.sin or joint.cos):
-                out.append(f"joint {k} has terms, sin or cos, which belong to kind sines")
-            if (joint.sin or joint.cos) and not product and self.base_frequency is None:
-                out.append(f"joint {k} has sin or cos, which need base_frequency")
-        if not out and self.joints:
+    def _joint_faults(self) -> Iterator[LocatedFault]:
+        faults = list(joint_faults(self.kind, self.joints or (), self.base_frequency))
+        for fault in faults:
+            yield replace(fault, place=("joints", *fault.place))
+        if not faults and self.joints:
             with np.errstate(all="ignore"):  # absurd sizes become infinite, which is refused here
                 periods = max(curve.periods for curve in self._sine_curves())
             if not periods <= MOST_PERIODS:
-                out.append(f"the motion has {periods:.3g} periods, at most {MOST_PERIODS:.0e} are possible")
-        return "; ".join(out)
+                message = f"Input should have at most {MOST_PERIODS:.0e} periods in its duration, not {periods:.3g}"
+                yield LocatedFault(("joints",), message, self.joints)
 
-    def _sin2_faults(self) -> str:
+    def _sin2_faults(self) -> Iterator[LocatedFault]:
         dof = len(self.points[0].q) if self.points else 0
-        pairs = (("velocity", self.velocity), ("acceleration", self.acceleration))
-        return "; ".join(
-            f"{key} has {len(values)} values, the points have {dof}"
-            for key, values in pairs
-            if values and len(values) != dof
-        )
+        for key, values in (("velocity", self.velocity), ("acceleration", self.acceleration)):
+            if values and len(values) != dof:
+                yield LocatedFault((key,), f"Input should have as many values as q of the points: {dof}", values)
 
     def to_model(self) -> Trajectory:
         """Return the motion."""

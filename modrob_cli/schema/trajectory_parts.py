@@ -7,6 +7,7 @@ from pydantic import Field
 
 from modrob_cli.model.trajectory_curves import SineCurve
 from modrob_cli.schema.base import Angle, Document
+from modrob_cli.schema.located import LocatedFault
 
 
 class PointSpec(Document):
@@ -60,39 +61,63 @@ KEYS = {
 """Keys of points by the kind of the trajectory."""
 
 
-def point_faults(kind: str, points: Sequence[PointSpec]) -> list[str]:
-    """Everything that is wrong with points of one kind, in words."""
-    out = []
+def point_faults(kind: str, points: Sequence[PointSpec]) -> Iterator[LocatedFault]:
+    """Everything that is wrong with points of one kind."""
     dof = len(points[0].q)
-    for k, point in enumerate(points, start=1):
-        given = [key for key in ("t", "dq", "ddq", "dwell") if getattr(point, key) is not None]
-        wrong = [key for key in given if key not in KEYS[kind]]
-        if wrong:
-            out.append(f"point {k} has {' and '.join(wrong)}, which kind {kind} does not know")
+    for k, point in enumerate(points):
+        for key in ("t", "dq", "ddq", "dwell"):
+            if getattr(point, key) is not None and key not in KEYS[kind]:
+                yield LocatedFault(
+                    (k, key), f"Input should be nothing here: kind {kind} knows no {key}", getattr(point, key)
+                )
         if "t" in KEYS[kind] and point.t is None:
-            out.append(f"point {k} has no t")
+            yield LocatedFault((k,), "Input should have a time t", {})
         for key in ("q", "dq", "ddq"):
             values = getattr(point, key)
             if values is not None and len(values) != dof:
-                out.append(f"point {k} has {len(values)} values of {key}, the first point has {dof} of q")
-        if None in point.q and (kind != "waypoints" or k in (1, len(points))):
+                message = f"Input should have as many values as q of the first point: {dof}"
+                yield LocatedFault((k, key), message, values)
+        yield from _gap_faults(kind, k, point, kind != "waypoints" or k in (0, len(points) - 1))
+    yield from _time_faults(points) if "t" in KEYS[kind] else _way_faults(points)
+
+
+def _gap_faults(kind: str, k: int, point: PointSpec, is_forbidden: bool) -> Iterator[LocatedFault]:
+    for j, value in enumerate(point.q):
+        if value is None and is_forbidden:
             where = "the first and the last point" if kind == "waypoints" else f"points of kind {kind}"
-            out.append(f"point {k} has a gap, {where} need a position for every joint")
-    out += _time_faults(points) if "t" in KEYS[kind] else _way_faults(points)
-    return out
+            yield LocatedFault((k, "q", j), f"Input should be a position: {where} have no gaps", None)
 
 
-def _time_faults(points: Sequence[PointSpec]) -> Iterator[str]:
+def _time_faults(points: Sequence[PointSpec]) -> Iterator[LocatedFault]:
     times = [point.t for point in points]
     if times[0] is not None and times[0] != 0.0:
-        yield f"point 1 has t = {times[0]:.9g}, the first time must be 0"
+        yield LocatedFault((0, "t"), "Input should be 0, where motions begin", times[0])
     for k in range(1, len(times)):
         before, now = times[k - 1], times[k]
         if before is not None and now is not None and not now > before:
-            yield f"point {k + 1} has t = {now:.9g} after {before:.9g}, times must increase"
+            message = f"Input should be more than the {before:.9g} of the point before: times increase"
+            yield LocatedFault((k, "t"), message, now)
 
 
-def _way_faults(points: Sequence[PointSpec]) -> Iterator[str]:
+def _way_faults(points: Sequence[PointSpec]) -> Iterator[LocatedFault]:
     for k in range(1, len(points)):
         if points[k].q == points[k - 1].q:
-            yield f"point {k + 1} is the same as the one before, give that one a dwell instead"
+            message = "Input should differ from the point before; give that one a dwell instead"
+            yield LocatedFault((k, "q"), message, points[k].q)
+
+
+def joint_faults(kind: str, joints: Sequence[JointSinesSpec], base_frequency: float | None) -> Iterator[LocatedFault]:
+    """Keys of joints that do not go with the kind of sines, or are missing."""
+    product = kind == "sine-products"
+    for k, joint in enumerate(joints):
+        if product and joint.amplitude is None:
+            yield LocatedFault((k,), f"Input should have an amplitude for kind {kind}", {})
+        if not product and joint.amplitude is not None:
+            message = f"Input should be nothing here: kind {kind} has amplitudes in terms, sin and cos"
+            yield LocatedFault((k, "amplitude"), message, joint.amplitude)
+        for key in ("terms", "sin", "cos"):
+            values = getattr(joint, key)
+            if product and values:
+                yield LocatedFault((k, key), "Input should be nothing here: it belongs to kind sines", values)
+            if not product and values and key != "terms" and base_frequency is None:
+                yield LocatedFault((k, key), "Input should have a base_frequency in the document", values)

@@ -33,6 +33,7 @@ def bounds(
     overwrite: bool = False,
     report: Reporter = lambda fraction: None,
     rate: float | None = None,
+    topic: str | None = None,
 ) -> dict[str, Any]:
     """Bound the torques over a motion; tables, JSON and a picture.
 
@@ -41,7 +42,8 @@ def bounds(
     Parameters
     ----------
     report : called with the fraction that is done
-    rate : samples per second of a motion that is a trajectory document
+    rate : samples per second of a motion that is not sampled as CSV
+    topic : where the motion is in an MCAP file
 
     Returns
     -------
@@ -67,7 +69,7 @@ def bounds(
     names["picture"] = f"{stem}.bounds.png"
     watch, thinned, summary = LimitWatch(robot), ThinnedMotion(SHARE_SAMPLES), Summary(robot)
     curves = BoundsCurves(robot.dof)
-    reader = motion_reader(motion_path, robot, rate)
+    reader = motion_reader(motion_path, robot, rate, topic)
     with OutputFolder(out, overwrite) as folder:
         folder.claim(list(names.values()))
         with NumberCsv(folder.stage(names["bounds"]), _header(robot)) as table:
@@ -84,6 +86,7 @@ def bounds(
         result = {
             **summary.to_json(options),
             "rate": reader.rate if isinstance(reader, TrajectoryMotion) else None,
+            "motion_warnings": list(reader.warnings) if isinstance(reader, TrajectoryMotion) else [],
             "shares": [share_json(robot, i, ranking[i]) for i in range(robot.dof)],
             "share_samples": len(thinned.motion().t),
             "warnings": [warning_json(robot, excess, summary.samples) for excess in watch.found()],

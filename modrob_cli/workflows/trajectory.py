@@ -1,33 +1,46 @@
 """A trajectory: sampled, drawn, compared with the limits of a robot."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from modrob_cli.errors import NumericalError
+from modrob_cli.errors import NumericalError, UsageError
 from modrob_cli.io.number_csv import NumberCsv
 from modrob_cli.io.outputs import OutputFolder, provenance
+from modrob_cli.io.yaml_loader import is_same_file
 from modrob_cli.model.robot import Robot
-from modrob_cli.model.trajectory import Trajectory
 from modrob_cli.model.trajectory_extremes import QUANTITIES, Violation, extremes, violations
 from modrob_cli.plot.trajectory import TrajectoryLabels, draw_trajectory
-from modrob_cli.workflows.robots import LoadedRobot, load_robot
+from modrob_cli.workflows.robots import load_robot
+from modrob_cli.workflows.trajectory_mcap import check_fits, write_motion_mcap
 from modrob_cli.workflows.trajectory_motion import DEFAULT_RATE, LoadedTrajectory, TrajectoryMotion, load_trajectory
 
 _PER_TIME = ("", "/s", "/s^2", "/s^3")
 
 
+FORMATS = ("csv", "mcap")
+
+
 def trajectory(
-    path: Path, robot_path: Path | None, out: Path, rate: float = DEFAULT_RATE, overwrite: bool = False
+    path: Path,
+    robot_path: Path | None,
+    out: Path,
+    rate: float = DEFAULT_RATE,
+    overwrite: bool = False,
+    topic: str | None = None,
+    formats: Sequence[str] = FORMATS,
 ) -> dict[str, Any]:
     """Sample and draw a trajectory; with a robot, look for limits that it exceeds.
 
     Parameters
     ----------
     rate : samples per second
+    topic : where the motion is in an MCAP file
+    formats : of the samples, some of FORMATS
 
     Returns
     -------
@@ -36,32 +49,51 @@ def trajectory(
     Raises
     ------
     InputFileError
-        If a file cannot be used, or the robot has another number of joints; nothing is written then.
+        If a file cannot be used, or its joints are not those of the robot; nothing is written then.
     UsageError
-        If the rate makes no sense.
+        If the rate, the topic or a format makes no sense, or an output would replace the trajectory itself.
     NumericalError
         If a value is not finite.
     OutputExistsError
         If a file is there already and ``overwrite`` is false.
     """
-    loaded = load_trajectory(path)
+    unknown = [name for name in formats if name not in FORMATS]
+    if unknown or not formats:
+        raise UsageError(f"--format: found {', '.join(map(ascii, unknown))}, expected some of {','.join(FORMATS)}")
     robot = load_robot(robot_path) if robot_path is not None else None
-    if robot is not None:
-        loaded.check_joints(robot.robot)
+    arm = robot.robot if robot is not None else None
+    loaded = load_trajectory(path, arm, topic)
     motion = TrajectoryMotion(loaded.trajectory, rate)
-    name = loaded.document.name
-    names = {"samples": f"{name}.csv", "picture": f"{name}.png", "json": f"{name}.trajectory.json"}
+    if "mcap" in formats:
+        check_fits(motion)
+    names = _file_names(loaded, out, formats)
+    sources = provenance([loaded.path, *(robot.files if robot is not None else [])])
     with OutputFolder(out, overwrite) as folder:
         folder.claim(list(names.values()))
-        with NumberCsv(folder.stage(names["samples"]), _header(loaded.trajectory.dof)) as table:
-            for piece in motion:
-                table.write(np.column_stack([piece.t, piece.q, piece.dq, piece.ddq]))
-        found = violations(loaded.trajectory, robot.robot) if robot is not None else []
-        result = _result(loaded, robot, motion, found)
+        warnings = list(loaded.warnings)
+        if "samples" in names:
+            with NumberCsv(folder.stage(names["samples"]), _header(loaded.trajectory.dof)) as table:
+                for piece in motion:
+                    table.write(np.column_stack([piece.t, piece.q, piece.dq, piece.ddq]))
+        if "mcap" in names:
+            joint_names = arm.joint_names if arm is not None else loaded.joint_names
+            warnings += write_motion_mcap(folder.stage(names["mcap"]), motion, joint_names, sources)
+        found = violations(loaded.trajectory, arm) if arm is not None else []
+        result = {**_result(loaded, arm, motion, found), "warnings": warnings, "provenance": sources}
         folder.write(names["json"], json.dumps(result, indent=2, allow_nan=False) + "\n")
-        labels = _labels(loaded, robot.robot if robot is not None else None)
-        draw_trajectory(loaded.trajectory, labels, found, folder.stage(names["picture"]))
+        draw_trajectory(loaded.trajectory, _labels(loaded, arm), found, folder.stage(names["picture"]))
     return {**result, "files": {kind: str(out / file) for kind, file in names.items()}}
+
+
+def _file_names(loaded: LoadedTrajectory, out: Path, formats: Sequence[str]) -> dict[str, str]:
+    """Names of the files to write."""
+    name = loaded.name
+    samples = {"samples": f"{name}.csv"} if "csv" in formats else {}
+    mcap = {"mcap": f"{name}.mcap"} if "mcap" in formats else {}
+    names = {**samples, **mcap, "picture": f"{name}.png", "json": f"{name}.trajectory.json"}
+    if any(is_same_file(loaded.path, out / file) for file in names.values()):
+        raise UsageError(f"{loaded.path}: an output would replace it; choose another folder with -o")
+    return names
 
 
 def _header(dof: int) -> list[str]:
@@ -69,23 +101,22 @@ def _header(dof: int) -> list[str]:
 
 
 def _result(
-    loaded: LoadedTrajectory, robot: LoadedRobot | None, motion: TrajectoryMotion, found: list[Violation]
+    loaded: LoadedTrajectory, arm: Robot | None, motion: TrajectoryMotion, found: list[Violation]
 ) -> dict[str, Any]:
-    arm = robot.robot if robot is not None else None
     checked = _limits_known(arm)
     return {
-        "trajectory": loaded.document.name,
-        "kind": loaded.document.kind,
+        "trajectory": loaded.name,
+        "kind": loaded.kind,
+        "detail": loaded.detail,
         "robot": arm.name if arm is not None else None,
         "dof": loaded.trajectory.dof,
         "duration": loaded.trajectory.duration,
         "rate": motion.rate,
         "samples": motion.samples,
-        "joints": _joints(loaded.trajectory, arm),
+        "joints": _joints(loaded, arm),
         "limits_checked": checked,
         "within_limits": not found if checked else None,
-        "violations": [_violation(violation, arm) for violation in found],
-        "provenance": provenance([loaded.path, *(robot.files if robot is not None else [])]),
+        "violations": [_violation(violation, arm, loaded) for violation in found],
     }
 
 
@@ -101,10 +132,10 @@ def _unit(robot: Robot | None, j: int) -> str | None:
     return "rad" if robot.joints[j].type == "revolute" else "m"
 
 
-def _joints(motion: Trajectory, robot: Robot | None) -> list[dict[str, Any]]:
+def _joints(loaded: LoadedTrajectory, robot: Robot | None) -> list[dict[str, Any]]:
     out = []
-    for j, curve in enumerate(motion.curves):
-        joint: dict[str, Any] = {"name": _name(robot, j), "unit": _unit(robot, j)}
+    for j, curve in enumerate(loaded.trajectory.curves):
+        joint: dict[str, Any] = {"name": _name(loaded, robot, j), "unit": _unit(robot, j)}
         for order, quantity in enumerate(QUANTITIES):
             with np.errstate(all="ignore"):
                 found = extremes(curve, order)
@@ -117,13 +148,14 @@ def _joints(motion: Trajectory, robot: Robot | None) -> list[dict[str, Any]]:
     return out
 
 
-def _name(robot: Robot | None, j: int) -> str:
-    return robot.joints[j].name if robot is not None else f"joint {j + 1}"
+def _name(loaded: LoadedTrajectory, robot: Robot | None, j: int) -> str:
+    names = robot.joint_names if robot is not None else loaded.joint_names
+    return names[j] if names is not None else f"joint {j + 1}"
 
 
-def _violation(violation: Violation, robot: Robot | None) -> dict[str, Any]:
+def _violation(violation: Violation, robot: Robot | None, loaded: LoadedTrajectory) -> dict[str, Any]:
     """A violation as plain data, with a sentence for people."""
-    name = _name(robot, violation.joint)
+    name = _name(loaded, robot, violation.joint)
     unit = f"{_unit(robot, violation.joint)}{_PER_TIME[QUANTITIES.index(violation.quantity)]}"
     low, high = violation.limit
     reached = f"{name}: {violation.quantity} {violation.value:.6g} {unit} at t = {violation.time:.6g} s"
@@ -133,13 +165,13 @@ def _violation(violation: Violation, robot: Robot | None) -> dict[str, Any]:
 
 
 def _labels(loaded: LoadedTrajectory, robot: Robot | None) -> TrajectoryLabels:
-    motion, document = loaded.trajectory, loaded.document
-    kind = f"{document.kind}, order {document.order}" if document.order else document.kind
+    motion = loaded.trajectory
+    kind = f"{loaded.kind}, {loaded.detail}" if loaded.detail else loaded.kind
     subtitle = f"{kind}; {motion.dof} joints, {motion.duration:.6g} s"
     return TrajectoryLabels(
-        document.name if robot is None else f"{document.name} on {robot.name}",
+        loaded.name if robot is None else f"{loaded.name} on {robot.name}",
         subtitle,
-        tuple(_name(robot, j) for j in range(motion.dof)),
+        tuple(_name(loaded, robot, j) for j in range(motion.dof)),
         tuple(_unit(robot, j) or "rad" for j in range(motion.dof)),
         tuple(tuple(getattr(joint.limits, key) for key in QUANTITIES[:3]) for joint in robot.joints) if robot else (),
     )

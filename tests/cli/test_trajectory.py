@@ -65,7 +65,7 @@ def test_files_and_result(modrob: Modrob, tmp_path: Path) -> None:
     # From -pi/4 at 9 s ... the fastest move of joint 1 is 5 pi/8 in 3 s.
     assert first["max"] == pytest.approx(15 / 8 * 5 * np.pi / 8 / 3, rel=1e-12)
     assert first["max_time"] == pytest.approx(4.5, abs=1e-7)
-    assert set(data["files"]) == {"samples", "picture", "json"}
+    assert set(data["files"]) == {"samples", "mcap", "picture", "json"}
     stored = json.loads((tmp_path / "out" / "table-b1.trajectory.json").read_text())
     assert stored == {key: value for key, value in data.items() if key != "files"}
     assert (tmp_path / "out" / "table-b1.png").read_bytes().startswith(b"\x89PNG")
@@ -137,6 +137,7 @@ def test_exceeded_limits_are_written_and_said(modrob: Modrob, move: Path, worksp
     assert "j1: velocity 1.875 rad/s at t = 0.5 s, 0.375 outside of -1.5 .. 1.5" in result.stderr
     assert sorted(path.name for path in (workspace / "out").iterdir()) == [
         "move.csv",
+        "move.mcap",
         "move.png",
         "move.trajectory.json",
     ]
@@ -222,6 +223,9 @@ def test_examples_of_the_documentation(modrob: Modrob, tmp_path: Path, monkeypat
     for k, text in enumerate(documents):
         (tmp_path / f"{k}.yaml").write_text(text, encoding="utf-8")
         assert modrob("trajectory", f"{k}.yaml", "-o", "all").exit_code == 0
+    (message,) = re.findall(r"```json\n(.*?)```", page, flags=re.DOTALL)
+    (tmp_path / "plan.json").write_text(message, encoding="utf-8")
+    assert modrob("trajectory", "plan.json", "-o", "all").exit_code == 0
     (tmp_path / "pick.yaml").write_text(documents[0], encoding="utf-8")
     robot = ROOT / "assemblies" / "lwa4p-6-payload.yaml"
     result = modrob("trajectory", "pick.yaml", "--robot", robot, "-o", "out")
