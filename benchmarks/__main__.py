@@ -1,6 +1,7 @@
 """Time the commands as whole processes: ``python -m benchmarks [--many 500]``.
 
 Machines differ and are shared: compare the last column, the ratio to ``python -c 'import numpy'`` in the same run.
+The other benchmarks run by their own names, such as ``python -m benchmarks.simulate_speed``; see docs/benchmarks.md.
 """
 
 import argparse

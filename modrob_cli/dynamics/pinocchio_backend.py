@@ -10,7 +10,7 @@ import numpy as np
 
 from modrob_cli.arrays import Array
 from modrob_cli.dynamics.link_inertia import joined
-from modrob_cli.errors import ShapeError
+from modrob_cli.errors import NumericalError, ShapeError
 from modrob_cli.model.robot import Robot
 
 TOOL_FRAME = "modrob_tool"
@@ -21,6 +21,11 @@ def build_model(robot: Robot) -> Any:
 
     Joint i of the robot is joint i of the model (0 is the fixed base), the frames are those of the links, and the
     frame :data:`TOOL_FRAME` is the end effector. Friction, rotor inertia and limits are not carried over.
+
+    Raises
+    ------
+    NumericalError
+        If a link has a tensor of inertia that is not positive.
     """
     import pinocchio as pin
 
@@ -32,7 +37,11 @@ def build_model(robot: Robot) -> Any:
         # The names carry the index, because Pinocchio wants them unique and the base is named "universe".
         model.addJoint(index, kind, pin.SE3(joint.zero_placement), f"{index + 1}:{joint.name}")
     for link in range(robot.dof + 1):
-        inertia = pin.Inertia(*joined(robot.bodies_of(link)).central())
+        try:
+            inertia = pin.Inertia(*joined(robot.bodies_of(link)).central())
+        except RuntimeError as error:
+            bodies = ", ".join(placed.body.name for placed in robot.bodies_of(link))
+            raise NumericalError(f"mass and inertia of {bodies} are not those of a real body") from error
         model.appendBodyToJoint(link, inertia, pin.SE3.Identity())
     model.addFrame(pin.Frame(TOOL_FRAME, robot.dof, 0, pin.SE3(robot.tool_transform), pin.FrameType.OP_FRAME))
     return model

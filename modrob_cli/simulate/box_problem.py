@@ -7,8 +7,9 @@ from modrob_cli.errors import NumericalError
 
 LOW, INSIDE, HIGH = -1, 0, 1
 
+_FAILED = "the friction forces at rest could not be found; are some inertias zero?"
 _SLACK = 1e-12
-"""Rounding of forces and accelerations, relative to the largest."""
+"""Rounding of forces, and of the terms whose sum an acceleration is, relative to the largest."""
 
 
 def solve_box_problem(A: Array, c: Array, low: Array, high: Array) -> tuple[Array, list[int]]:
@@ -32,26 +33,33 @@ def solve_box_problem(A: Array, c: Array, low: Array, high: Array) -> tuple[Arra
     Raises
     ------
     NumericalError
-        If rounding keeps the rule from an end.
+        If A is singular, or rounding keeps the rule from an end. (NaN is no error and comes out as NaN.)
     """
     k = len(c)
-    state = [INSIDE] * k
+    state, size = [INSIDE] * k, np.abs(A)
     for _ in range(4 * 3 ** min(k, 8)):
         x = np.where(np.equal(state, HIGH), high, low)
         inside = np.equal(state, INSIDE)
         x[inside] = 0.0
         if inside.any():
-            x[inside] = np.linalg.solve(A[np.ix_(inside, inside)], -(A @ x + c)[inside])
-        wrong = _first_wrong(state, x, A @ x + c, low, high)
+            x[inside] = _solved(A[np.ix_(inside, inside)], -(A @ x + c)[inside])
+        slack = _SLACK * (size @ np.abs(x) + np.abs(c))
+        wrong = _first_wrong(state, x, A @ x + c, slack, low, high)
         if wrong is None:
             return x, state
         state[wrong[0]] = wrong[1]
-    raise NumericalError("the friction forces at rest could not be found; are some inertias zero?")
+    raise NumericalError(_FAILED)
 
 
-def _first_wrong(state: list[int], x: Array, g: Array, low: Array, high: Array) -> tuple[int, int] | None:
+def _solved(A: Array, b: Array) -> Array:
+    try:
+        return np.asarray(np.linalg.solve(A, b))
+    except np.linalg.LinAlgError as error:
+        raise NumericalError(_FAILED) from error
+
+
+def _first_wrong(state: list[int], x: Array, g: Array, slack: Array, low: Array, high: Array) -> tuple[int, int] | None:
     """First force that breaks a condition and the state it should have; None if all are right."""
-    slack = _SLACK * float(np.abs(g).max(initial=0.0))
     for i, now in enumerate(state):
         if now == INSIDE:
             reach = _SLACK * abs(x[i])
@@ -59,6 +67,6 @@ def _first_wrong(state: list[int], x: Array, g: Array, low: Array, high: Array) 
                 return i, HIGH
             if x[i] < low[i] - reach:
                 return i, LOW
-        elif (now == HIGH and g[i] > slack) or (now == LOW and g[i] < -slack):
+        elif (now == HIGH and g[i] > slack[i]) or (now == LOW and g[i] < -slack[i]):
             return i, INSIDE
     return None

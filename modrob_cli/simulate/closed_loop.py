@@ -11,9 +11,10 @@ from modrob_cli.model.robot import Robot
 from modrob_cli.model.scenario import Scenario
 from modrob_cli.model.trajectory import Trajectory
 from modrob_cli.simulate.controllers.interface import Controller, Desired
-from modrob_cli.simulate.plant import Plant, State
+from modrob_cli.simulate.plant import Plant
 from modrob_cli.simulate.recording import EnergyBalance, Recorder, Run
 from modrob_cli.simulate.sensors import SensorBank
+from modrob_cli.simulate.steps import State
 from modrob_cli.simulate.truth import TrueRobot
 
 MOST_STEPS = 20_000_000
@@ -78,48 +79,59 @@ class ClosedLoop:
             return self._run(progress or (lambda _: None))
 
     def _run(self, progress: Callable[[float], None]) -> Run:
-        scenario, dof = self.scenario, self.robot.dof
+        scenario, dof, every = self.scenario, self.robot.dof, self._every
         plant = Plant(self.truth, scenario.contacts, scenario.end_stops)
         times = np.minimum(np.arange(self._steps + 1) * self._period, self.trajectory.duration)
         desired = self.trajectory.sample(times, 2)
-        samples = self._steps // self._every + 1
-        bank = SensorBank(scenario.sensors, self._every * self._period, samples, self.effort_factor, self.rng)
-        recorder, state = Recorder(samples, dof), self._start(desired[0])
+        samples = self._steps // every + 1
+        bank = SensorBank(scenario.sensors, every * self._period, samples, self.effort_factor, self.rng)
+        recorder, state = Recorder(samples, dof), self._start(plant, desired[0])
         balance, look = EnergyBalance(plant, state), max(self._steps // _LOOKS, 1)
         low, high = torque_limits(self.robot) if scenario.saturation else (np.full(dof, -np.inf), np.full(dof, np.inf))
-        cut, applied, diverged = np.zeros(dof), None, None
+        cut, diverged = np.zeros(dof), None
+        applied: Array | None = None
         h = self._period / scenario.sub_steps
         for k, t in enumerate(times.tolist()):
             state.t = t
-            sampled = k % self._every == 0
+            sampled = k % every == 0
             if sampled:
                 bank.measure(state.q, state.dq)
             commanded = self._command(t, *bank.delayed(), Desired(*desired[k]))
-            before, applied = applied, np.minimum(np.maximum(commanded, low), high)
-            cut += applied != commanded
-            if not (np.abs(state.dq).max() < FASTEST and np.isfinite(commanded).all()):
+            if not (state.dq.dot(state.dq) < FASTEST**2 and np.count_nonzero(np.isfinite(commanded)) == dof):
                 diverged = t
                 break
-            if sampled:
-                self._record(recorder, plant, state, bank, desired[k], commanded, applied, before)
+            before, applied = applied, np.minimum(np.maximum(commanded, low), high)
+            cut += applied != commanded
+            q, dq = state.q, state.dq  # the step makes new ones
             if k == self._steps:
-                break
-            for _ in range(scenario.sub_steps):
-                plant.advance(state, applied, h)
-            if k % look == 0:
+                ddq = plant.accelerations(state, applied)
+            else:
+                ddq = plant.advance(state, applied, h)
+                for _ in range(1, scenario.sub_steps):
+                    plant.advance(state, applied, h)
+            if sampled:
+                recorder.add(t, (q, dq, ddq, commanded, applied, applied if before is None else before, *bank.latest))
+            if k % look == 0 or k == self._steps:
                 balance.check(state)
                 progress(k / self._steps)
-        if diverged is None:
-            balance.check(state)
         progress(1.0)
-        recording = recorder.recording(bank.jitter)
+        recording = recorder.recording(desired[::every], plant, bank, h)
         return Run(self.truth, recording, diverged, cut / (k + 1), tuple(plant.hits), balance.relative_error())
 
-    def _start(self, first: Array) -> State:
+    def _start(self, plant: Plant, first: Array) -> State:
         """State at the beginning; ``first`` is the desired one, shape (3, n)."""
-        given = (self.scenario.initial_q, self.scenario.initial_dq)
-        q, dq = (np.array(first[k] if value is None else value) for k, value in enumerate(given))
-        return State(0.0, q, dq)
+        given = {"q": self.scenario.initial_q, "dq": self.scenario.initial_dq}
+        for name, value in given.items():
+            if value is not None and not (value.shape == (self.robot.dof,) and np.isfinite(value).all()):
+                raise UsageError(f"initial {name}: found {value.tolist()}, expected {self.robot.dof} finite numbers")
+        q, dq = (first[k] if value is None else value for k, value in enumerate(given.values()))
+        state = plant.start(q, dq)
+        rate, steps = plant.dynamics.decay_rate(state.q), self.scenario.sub_steps
+        least = int(np.ceil(rate * self._period * (1.0 - _SAME)))
+        if least > steps:
+            found = f"sub_steps: found {steps}, but viscous friction slows joints down within {1.0 / rate:.3g} s"
+            raise UsageError(f"{found}; expected {least} or more, or a higher rate of the controller")
+        return state
 
     def _command(self, t: float, q: Array, dq: Array, desired: Desired) -> Array:
         try:
@@ -130,27 +142,6 @@ class ClosedLoop:
             found = f"an array of shape {command.shape}"
             raise UsageError(f"the controller gave {found}, expected {self.robot.dof} torques")
         return command
-
-    def _record(
-        self,
-        recorder: Recorder,
-        plant: Plant,
-        state: State,
-        bank: SensorBank,
-        desired: Array,
-        commanded: Array,
-        applied: Array,
-        before: Array | None,
-    ) -> None:
-        """Record one sample; the motor still gives the torque of the command before when its effort is measured."""
-        ddq = plant.accelerations(state, applied)
-        external = plant.external_torque(state)
-        friction = applied + external - plant.dynamics.inverse(state.q, state.dq, ddq)
-        true = {"q": state.q, "dq": state.dq, "ddq": ddq, "friction": friction, "external": external}
-        q_measured, dq_measured = bank.latest
-        effort = bank.measure_effort(applied if before is None else before)
-        measured = {"q_measured": q_measured, "dq_measured": dq_measured, "effort": effort}
-        recorder.add(state.t, desired, **true, **measured, commanded=commanded, applied=applied)
 
 
 def samples_every(scenario: Scenario) -> int:

@@ -5,10 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from modrob_cli.arrays import Array
-from modrob_cli.simulate.plant import Plant, State, StopHit
+from modrob_cli.simulate.plant import Plant, StopHit
+from modrob_cli.simulate.sensors import SensorBank
+from modrob_cli.simulate.steps import State
 from modrob_cli.simulate.truth import TrueRobot
 
-FIELDS = ("q", "dq", "ddq", "friction", "external", "commanded", "applied", "q_measured", "dq_measured", "effort")
+FIELDS = ("q", "dq", "ddq", "commanded", "applied", "before", "q_measured", "dq_measured")
+"""What is recorded while the arm moves; ``before`` is the motor torque until the sample."""
 
 
 @dataclass(frozen=True)
@@ -21,9 +24,9 @@ class Recording:
     desired : position, velocity, acceleration, shape (K, 3, n)
     values : shape (K, n) by name: true ``q``, ``dq``, ``ddq``; ``friction``, torque against the motor, with the
         constant torque of disturbance and friction band and what holds joints at rest or at their end stops;
-        ``external``, torque of contacts; ``commanded`` and ``applied`` motor torque; ``q_measured``, ``dq_measured`` and
-        ``effort`` as logged. ``ddq``, ``friction``, ``external``, ``commanded`` and ``applied`` are those just after
-        the sample; ``effort`` is measured just before the new command acts.
+        ``external``, torque of contacts; ``commanded`` and ``applied`` motor torque; ``q_measured``, ``dq_measured``
+        and ``effort`` as logged. ``ddq``, ``friction``, ``external``, ``commanded`` and ``applied`` are those just
+        after the sample; ``effort`` is measured just before the new command acts.
     """
 
     t: Array
@@ -56,25 +59,37 @@ class Recorder:
     """Collects samples into arrays that are made once."""
 
     def __init__(self, samples: int, dof: int) -> None:
-        self._values = {key: np.empty((samples, dof)) for key in FIELDS}
-        self._t = np.empty(samples)
-        self._desired = np.empty((samples, 3, dof))
-        self._count = 0
+        self.values = {key: np.zeros((samples, dof)) for key in FIELDS}
+        self.t = np.empty(samples)
+        self.count = 0
 
-    def add(self, t: float, desired: Array, **values: Array) -> None:
-        """Take one sample: desired (3, n), values (n,) for each of :data:`FIELDS`."""
-        k = self._count
-        self._t[k] = t
-        self._desired[k] = desired
-        for key, value in values.items():
-            self._values[key][k] = value
-        self._count += 1
+    def add(self, t: float, rows: tuple[Array, ...]) -> None:
+        """Take one sample: shape (n,) for each of :data:`FIELDS`."""
+        k = self.count
+        self.t[k] = t
+        for values, row in zip(self.values.values(), rows, strict=True):
+            values[k] = row
+        self.count += 1
 
-    def recording(self, jitter: Array) -> Recording:
-        """What was collected; ``jitter`` (K or more) is added to the stamps."""
-        k = self._count
-        values = {key: value[:k] for key, value in self._values.items()}
-        return Recording(self._t[:k], self._t[:k] + jitter[:k], self._desired[:k], values)
+    def recording(self, desired: Array, plant: Plant, bank: SensorBank, h: float) -> Recording:
+        """What was collected, with what follows from it.
+
+        Parameters
+        ----------
+        desired : of all samples or more, shape (K, 3, n)
+        h : length of a step [s]
+        """
+        t = self.t[: self.count]
+        values = {key: value[: self.count] for key, value in self.values.items()}
+        effort = bank.measure_effort(values.pop("before"))
+        external = np.zeros_like(effort)
+        if plant.contacts:
+            external[:] = [plant.external_torque(*row, h) for row in zip(t.tolist(), values["q"], strict=True)]
+        states = zip(values["q"], values["dq"], values["ddq"], strict=True)
+        moving = np.reshape([plant.dynamics.inverse(*state) for state in states], effort.shape)
+        friction = values["applied"] + external - moving
+        values |= {"friction": friction, "external": external, "effort": effort}
+        return Recording(t, t + bank.jitter[: self.count], desired[: self.count], values)
 
 
 class EnergyBalance:

@@ -3,11 +3,13 @@
 import numpy as np
 
 from modrob_cli.arrays import Array
-from modrob_cli.model.scenario import Channel, NoiseShape, Sensors
+from modrob_cli.errors import UsageError
+from modrob_cli.model.scenario import GainValue, NoiseShape, Sensors
 
 _MOST_JITTER = 0.49
 """Stamps are moved by less than half a period, so that they never go back."""
 _SAME = 1e-6
+_CHANNELS = ("position", "velocity", "effort")
 
 
 class SensorBank:
@@ -22,6 +24,11 @@ class SensorBank:
     Attributes
     ----------
     jitter : errors of the time stamps, shape (samples,), [s]
+
+    Raises
+    ------
+    UsageError
+        If a channel has another number of values than there are joints.
     """
 
     def __init__(
@@ -32,10 +39,11 @@ class SensorBank:
         self._period = period
         self._factor = effort_factor
         shape = (samples, n)
-        self._noise = {
-            key: _draw(getattr(sensors, key).noise, sensors.noise, shape, rng)
-            for key in ("position", "velocity", "effort")
-        }
+        channels = {key: getattr(sensors, key) for key in _CHANNELS}
+        noise = {key: _for_joints(key, channel.noise, n) for key, channel in channels.items()}
+        steps = {key: _for_joints(key, channel.resolution, n) for key, channel in channels.items()}
+        self._noise = {key: _draw(size, sensors.noise, shape, rng) for key, size in noise.items()}
+        self._step = {key: step if step.any() else None for key, step in steps.items()}
         jitter = _draw(sensors.jitter, sensors.noise, (samples, 1), rng)[:, 0]
         self.jitter = np.clip(jitter, -_MOST_JITTER * period, _MOST_JITTER * period)
         self._delay = max(int(np.ceil(sensors.delay / period - _SAME)), 0)
@@ -54,27 +62,36 @@ class SensorBank:
     def measure(self, q: Array, dq: Array) -> None:
         """Take the next sample of true position and velocity, shape (n,) each."""
         k, sensors = self._count, self._sensors
-        q_measured = _quantised(q + self._noise["position"][k], sensors.position)
+        q_measured = _quantised(q + self._noise["position"][k], self._step["position"])
         if sensors.velocity_source == "differentiated" and k:
             dq = (q_measured - self.latest[0]) / self._period
-        dq_measured = _quantised(dq + self._noise["velocity"][k], sensors.velocity)
+        dq_measured = _quantised(dq + self._noise["velocity"][k], self._step["velocity"])
         self._samples.append((q_measured, dq_measured))
         del self._samples[: -self._delay - 1]
         self._count += 1
 
     def measure_effort(self, tau: Array) -> Array:
-        """Measured effort of the last sample, shape (n,), for this joint torque of the motors."""
-        noise = self._noise["effort"][self._count - 1]
-        return _quantised(tau * self._factor + noise, self._sensors.effort)
+        """Measured effort of the first K samples, shape (K, n), for these joint torques of the motors."""
+        return _quantised(tau * self._factor + self._noise["effort"][: len(tau)], self._step["effort"])
 
 
-def _draw(size: float, shape_of: NoiseShape, shape: tuple[int, ...], rng: np.random.Generator) -> Array:
+def _for_joints(channel: str, value: GainValue, n: int) -> Array:
+    """One number for each joint, shape (n,)."""
+    values = np.asarray(value, dtype=float)
+    if values.ndim and len(values) != n:
+        raise UsageError(f"sensors: {channel}: found {len(values)} values for {n} joints")
+    return np.array(np.broadcast_to(values, (n,)))
+
+
+def _draw(size: Array | float, shape_of: NoiseShape, shape: tuple[int, ...], rng: np.random.Generator) -> Array:
     """Noise; the numbers are drawn also where the size is zero, so that one channel does not change another."""
     raw = rng.standard_normal(shape) if shape_of == "gaussian" else rng.uniform(-1.0, 1.0, shape)
     return np.asarray(size * raw)
 
 
-def _quantised(value: Array, channel: Channel) -> Array:
-    if channel.resolution == 0.0:
+def _quantised(value: Array, step: Array | None) -> Array:
+    """Nearest multiple of the step of each joint, shape (..., n); the value itself where the step is 0."""
+    if step is None:
         return value
-    return np.asarray(channel.resolution * np.round(value / channel.resolution))
+    positive = step > 0.0
+    return np.where(positive, step * np.round(value / np.where(positive, step, 1.0)), value)

@@ -58,7 +58,7 @@ def true_robot(robot: Robot, truth: Truth, rng: np.random.Generator, payload: Ri
     Raises
     ------
     UsageError
-        If a name is unknown, or a value that was set lies outside its interval.
+        If a name is unknown, a value that was set lies outside its interval, or makes a body that cannot be real.
     """
     _check_names("body", truth.bodies, [placed.body.name for placed in robot.bodies], BODY_KEYS)
     _check_names("joint", truth.joints, list(robot.joint_names), JOINT_KEYS)
@@ -106,7 +106,11 @@ def _draw_body(body: RigidBody, truth: Truth, rng: np.random.Generator) -> tuple
     if not real:
         values = {key: part.nominal for key, part in parts.items()}
     values |= {key: _chosen(f"body {body.name}: {key}", given[key], parts[key]) for key in given}
-    return _with_values(body, values), real
+    chosen = _with_values(body, values)
+    if given and not _is_real(chosen):
+        what = "mass, com and inertia together are not those of a real body"
+        raise UsageError(f"truth: body {body.name}: {what}; expected other values, or values for all three")
+    return chosen, real
 
 
 def _with_values(body: RigidBody, values: Mapping[str, Array]) -> RigidBody:
@@ -150,7 +154,7 @@ def _draw(part: Uncertain, draw: Draw, rng: np.random.Generator) -> Array:
     if draw == "vertices":
         share = np.round(share)
     low, high = part.interval.inf, part.interval.sup
-    return np.clip(low + share * (high - low), low, high)
+    return np.clip((1.0 - share) * low + share * high, low, high)  # the ends exactly where the share is 0 or 1
 
 
 def _chosen(what: str, value: ArrayLike, part: Uncertain) -> Array:

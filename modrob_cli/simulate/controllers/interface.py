@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -11,6 +11,11 @@ from modrob_cli.errors import UsageError
 from modrob_cli.model.scenario import Control, GainValue
 from modrob_cli.model.trajectory import Trajectory
 from modrob_cli.simulate.control_model import ControlModel
+
+Sign = Literal["any", "not negative", "positive"]
+
+_STATES = 50
+"""States along the motion at which the inertia that each joint feels is looked at."""
 
 
 class Desired(NamedTuple):
@@ -52,25 +57,41 @@ class ControlTask:
     period: float
     control: Control
 
-    def gain(self, name: str, default: GainValue | None = None) -> Array:
+    def gain(self, name: str, default: GainValue | Array | None = None, sign: Sign = "any") -> Array:
         """One gain for each joint, shape (n,).
 
         Raises
         ------
         UsageError
-            If it is not given and has no default, or has another number of values than the robot has joints.
+            If it is not given and has no default, has another number of values than the robot has joints, or one of
+            them is not finite or of the wrong sign.
         """
         value = self.control.gains.get(name, default)
         if value is None:
-            raise UsageError(
-                f"controller: the gain {name} is missing; give it in the scenario or with --gain {name}=..."
-            )
+            raise UsageError(f"controller: the gain {name} is missing; give it in a scenario, under control: gains")
         values = np.asarray(value, dtype=float)
-        if values.ndim and len(values) != self.model.dof:
-            raise UsageError(f"controller: gain {name}: found {len(values)} values for {self.model.dof} joints")
+        if values.shape not in ((), (self.model.dof,)):
+            raise UsageError(f"controller: gain {name}: found {values.size} values for {self.model.dof} joints")
         if not np.isfinite(values).all():
             raise UsageError(f"controller: gain {name}: expected finite numbers")
+        worst = float(values.min())
+        if worst < 0.0 and sign != "any" or worst == 0.0 and sign == "positive":
+            least = "numbers > 0" if sign == "positive" else "numbers >= 0"
+            raise UsageError(f"controller: gain {name}: found {worst:.6g}, expected {least}")
         return np.array(np.broadcast_to(values, (self.model.dof,)))
+
+    def joint_inertia(self) -> Array:
+        """What a torque at one joint has to accelerate while the others are free, 1 / (M^-1)_ii, shape (n,).
+
+        The smallest along the motion, rotors included, [kg m^2] or [kg]; 0 where M has no inverse. Gains in proportion
+        to it suit every arm: the eigenvalues of M^-1 times a matrix that has it on its diagonal add up to n at most.
+        """
+        times = np.linspace(0.0, self.trajectory.duration, _STATES)
+        along = [self.model.inertia(q) for q in self.trajectory.sample(times, 0)[:, 0]]
+        try:
+            return np.asarray(np.min([1.0 / np.diag(np.linalg.inv(M)) for M in along], axis=0))
+        except np.linalg.LinAlgError:
+            return np.zeros(self.model.dof)
 
     def check_gains(self, known: Sequence[str]) -> None:
         """Make sure that every gain that is given is known.
@@ -89,9 +110,13 @@ class ControlTask:
         band = self.control.friction_band
         return np.clip(dq / band, -1.0, 1.0) if band > 0.0 else np.sign(dq)
 
+    def friction_velocity(self, dq: Array, desired_dq: Array) -> Array:
+        """Velocity from which friction is computed, measured or desired, shape (n,)."""
+        return desired_dq if self.control.friction == "desired" else dq
+
     def friction(self, dq: Array, desired_dq: Array) -> Array:
         """Nominal viscous and Coulomb friction that the controller compensates, shape (n,)."""
         if self.control.friction == "none":
             return np.zeros(self.model.dof)
-        velocity = dq if self.control.friction == "measured" else desired_dq
+        velocity = self.friction_velocity(dq, desired_dq)
         return np.asarray(self.model.viscous * velocity + self.model.coulomb * self.sign(velocity))
