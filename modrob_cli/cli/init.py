@@ -17,7 +17,7 @@ def register(app: typer.Typer) -> None:
 
 
 def init(folder: Folder, overwrite: Overwrite = False) -> None:
-    """Lay out a workspace with modules/, assemblies/ and trajectories/.
+    """Lay out a workspace with modules/, assemblies/, trajectories/ and scenarios/.
 
     The shipped catalogue and assemblies are copied, with a README that says what to do next. Files that exist are
     left alone, and then nothing is written, unless --overwrite is given.

@@ -1,10 +1,10 @@
-"""The data that modrob brings along: catalogue, assemblies, trajectories."""
+"""The data that modrob brings along: catalogue, assemblies, trajectories, scenarios."""
 
 from pathlib import Path
 
 from modrob_cli.errors import ModrobError
 
-SHIPPED_FOLDERS = ("modules", "assemblies", "trajectories")
+SHIPPED_FOLDERS = ("modules", "assemblies", "trajectories", "scenarios")
 
 
 def shipped_folder(name: str) -> Path:

@@ -64,7 +64,8 @@ def draw_simulation(picture: SimulationPicture, path: Path) -> None:
         _draw_limits(row[2], picture.limits[:, j], picture.torque[:, j])
         for axis, unit in zip(row, units, strict=True):
             for start, end in picture.contacts:
-                axis.axvspan(start, end, color=CONTACT, zorder=0, linewidth=0)
+                # A hit is shorter than a pixel; the edge keeps it in sight.
+                axis.axvspan(start, end, facecolor=CONTACT, edgecolor=CONTACT, zorder=0, linewidth=1.5)
             axis.set_ylabel(unit, fontsize=9)
         row[0].set_title(_plain(picture.names[j]), loc="left", y=1.0, fontsize=10, fontweight="bold")
         largest = np.abs(error).max(initial=0.0)

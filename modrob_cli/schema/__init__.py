@@ -4,6 +4,7 @@ from modrob_cli.schema.assembly import AssemblyDocument
 from modrob_cli.schema.base import Document
 from modrob_cli.schema.module import ModuleDocument
 from modrob_cli.schema.robot import RobotDocument
+from modrob_cli.schema.scenario import ScenarioDocument
 from modrob_cli.schema.trajectory import TrajectoryDocument
 
 DOCUMENTS: dict[str, type[Document]] = {
@@ -11,7 +12,16 @@ DOCUMENTS: dict[str, type[Document]] = {
     "assembly/1": AssemblyDocument,
     "robot/1": RobotDocument,
     "trajectory/1": TrajectoryDocument,
+    "scenario/1": ScenarioDocument,
 }
 """Document kinds by the value of their first key ``modrob``."""
 
-__all__ = ["DOCUMENTS", "AssemblyDocument", "Document", "ModuleDocument", "RobotDocument", "TrajectoryDocument"]
+__all__ = [
+    "DOCUMENTS",
+    "AssemblyDocument",
+    "Document",
+    "ModuleDocument",
+    "RobotDocument",
+    "ScenarioDocument",
+    "TrajectoryDocument",
+]

@@ -12,8 +12,9 @@ from modrob_cli.errors import Fault, InputFileError, ModrobError
 from modrob_cli.io.catalogue import Catalogue, read_assembly, yaml_files
 from modrob_cli.io.documents import check_document, kind_of
 from modrob_cli.io.yaml_loader import YamlDocument, is_folder, load_yaml
-from modrob_cli.model.plausibility import Remark, assembly_remarks, module_remarks, robot_remarks
-from modrob_cli.schema import AssemblyDocument, ModuleDocument, RobotDocument, TrajectoryDocument
+from modrob_cli.model.plausibility import Remark, assembly_remarks, module_remarks, payload_remarks, robot_remarks
+from modrob_cli.schema import AssemblyDocument, ModuleDocument, RobotDocument, ScenarioDocument, TrajectoryDocument
+from modrob_cli.workflows.scenarios import controller_faults
 
 
 @dataclass(frozen=True)
@@ -125,9 +126,19 @@ def _remarks(path: Path, loaded: YamlDocument, catalogue: Catalogue) -> tuple[It
     if isinstance(document, AssemblyDocument):
         found = read_assembly(path, catalogue)
         return assembly_remarks(found.assembly, synthesize(found.assembly)), found.files[1:]
+    if isinstance(document, ScenarioDocument):
+        return _scenario_remarks(path, document, loaded), []
     if isinstance(document, TrajectoryDocument):
         document.to_model()
     return iter(()), []
+
+
+def _scenario_remarks(path: Path, document: ScenarioDocument, loaded: YamlDocument) -> Iterator[Remark]:
+    """Remarks on the payload; faults of the controller are raised. What fits a robot is not known here."""
+    faults = list(controller_faults(path, document, loaded))
+    if faults:
+        raise InputFileError(faults)
+    return payload_remarks(document.payload.to_model("payload")) if document.payload else iter(())
 
 
 def _warned(remark: Remark, loaded: YamlDocument) -> Warned:

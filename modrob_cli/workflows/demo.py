@@ -15,7 +15,8 @@ from modrob_cli.workflows.check import CheckResult, check
 from modrob_cli.workflows.simulate import simulate
 from modrob_cli.workflows.simulation_study import SimulateOptions
 from modrob_cli.workflows.trajectory import trajectory
-from modrob_cli.workflows.validate import ValidateOptions, validate
+from modrob_cli.workflows.validate import validate
+from modrob_cli.workflows.validate_options import ValidateOptions
 
 MAIN_ROBOT = "lwa4p-6"
 UNCERTAIN_ROBOT = "lwa4p-6-tol5"

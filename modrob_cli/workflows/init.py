@@ -14,6 +14,7 @@ README = """\
     modules/        what a module is: geometry, bodies, joints (module/1), one folder per catalogue
     assemblies/     modules bolted together (assembly/1), and arms given by a D-H table (robot/1)
     trajectories/   planned motions
+    scenarios/      what happens in simulated runs, and a controller in Python
 
 Check everything, then build a model of the six-axis arm:
 

@@ -61,7 +61,7 @@ def _controller_series(names: tuple[str, ...], recording: Recording, stamps: Sta
         "error": ("positions", "velocities"),
         "output": ("effort",),
     }
-    columns = [desired.reshape(len(desired), -1), *measured, *error, values["commanded"]]
+    columns = [desired.reshape(-1, 3 * len(names)), *measured, *error, values["commanded"]]
     return Series(CONTROLLER_STATE, controller_state(names, parts), stamps, np.hstack(columns))
 
 
