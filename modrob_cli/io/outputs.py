@@ -87,13 +87,19 @@ class OutputFolder:
             raise OutputExistsError(f"{', '.join(there)}: exists already; pass --overwrite to replace it")
 
     def stage(self, name: str) -> Path:
-        """Temporary path for a file; the caller writes it, the end of the block renames it."""
+        """Temporary path for a file; the caller writes it, the end of the block renames it.
+
+        The name may lie in a folder of its own, as in ``parts/one.yaml``; the folder is made.
+        """
         self.claim([name])
         target = self.folder / name
         if target in self._staged:
             raise UsageError(f"two outputs of one name: {target}; choose another name or folder")
         try:
-            handle, path = tempfile.mkstemp(prefix=".modrob-", suffix=target.suffix, dir=self.folder)
+            if not target.parent.exists():
+                target.parent.mkdir()
+                self._made.insert(0, target.parent)
+            handle, path = tempfile.mkstemp(prefix=".modrob-", suffix=target.suffix, dir=target.parent)
         except OSError as error:
             raise UsageError(f"cannot write into {self.folder}: {error.strerror}") from error
         os.close(handle)
