@@ -7,7 +7,7 @@ from modrob_cli.arrays import Array
 MAX_POINTS = 6000
 
 
-def thin(t: Array, x: Array) -> tuple[Array, Array]:
+def thin(t: Array, x: Array, most: int = MAX_POINTS) -> tuple[Array, Array]:
     """Keep the smallest and the largest of each run of samples, so that no peak is lost.
 
     Parameters
@@ -16,9 +16,9 @@ def thin(t: Array, x: Array) -> tuple[Array, Array]:
 
     Returns
     -------
-    t, x : at most about :data:`MAX_POINTS` of them
+    t, x : at most about ``most`` of them
     """
-    size = -(-len(x) // (MAX_POINTS // 2))
+    size = -(-len(x) // (most // 2))
     if size <= 2:
         return t, x
     whole = len(x) // size * size

@@ -1,6 +1,8 @@
 """From models back to document data: plain mappings and lists, ready to be written as YAML."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -9,6 +11,7 @@ from modrob_cli.arrays import Array
 from modrob_cli.interval import Interval
 from modrob_cli.model.body import INERTIA_ENTRIES, PlacedBody, RigidBody
 from modrob_cli.model.joint import Joint
+from modrob_cli.model.log import UsedLog
 from modrob_cli.model.robot import Robot
 from modrob_cli.model.uncertain import Uncertain
 from modrob_cli.spatial import to_xyz_rpy
@@ -18,10 +21,14 @@ _NAMED_ANGLES = {sign * math.pi / k: f"{'-' if sign < 0 else ''}pi{f'/{k}' if k 
 Data = dict[str, Any]
 
 
-def robot_data(robot: Robot, source: str = "") -> Data:
+def robot_data(robot: Robot, source: str = "", identified_from: Sequence[UsedLog] = ()) -> Data:
     """A robot as ``robot/1`` data with placements; every body keeps its own frame and box.
 
     Reading it back gives the same robot, to the rounding of roll, pitch and yaw (a few units in the last place).
+
+    Parameters
+    ----------
+    identified_from : logs that values were fitted to
     """
     data: Data = {"modrob": "robot/1", "name": robot.name}
     if source:
@@ -33,6 +40,10 @@ def robot_data(robot: Robot, source: str = "") -> Data:
     if np.any(robot.disturbance.mag > 0.0):
         ends = zip(robot.disturbance.inf, robot.disturbance.sup, strict=True)
         data["disturbance"] = [[float(low), float(high)] for low, high in ends]
+    if identified_from:
+        data["identified_from"] = [
+            {key: value for key, value in asdict(used).items() if value is not None} for used in identified_from
+        ]
     return data
 
 

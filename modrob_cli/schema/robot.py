@@ -4,7 +4,7 @@ from collections import Counter
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, StringConstraints, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from modrob_cli.arrays import Array
@@ -69,6 +69,15 @@ def _unique_names(joints: list[RobotJointSpec]) -> list[RobotJointSpec]:
     return joints
 
 
+class UsedLogSpec(Document):
+    """A stretch of a log from which values of this file were identified."""
+
+    log: str = Field(max_length=1000, description="name of the file")
+    sha256: Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")] = Field(description="of the file")
+    start: float = Field(default=0.0, ge=0.0, description="first sample that was used, after the start of the log [s]")
+    end: float | None = Field(default=None, gt=0.0, description="last one; left out: to the end [s]")
+
+
 class RobotDocument(Document):
     """A serial arm.
 
@@ -87,6 +96,9 @@ class RobotDocument(Document):
     tool_transform: PoseSpec = Field(default=PoseSpec(), description="end effector in the frame of the last link")
     payload: BodySpec | None = Field(default=None, description="body at the end effector, in the tool frame")
     disturbance: Disturbance = [[0.0, 0.0]]
+    identified_from: list[UsedLogSpec] = Field(
+        default=[], description="logs that values were fitted to, which therefore cannot validate them"
+    )
 
     @field_validator("bodies")
     @classmethod

@@ -8,6 +8,7 @@ from modrob_cli.errors import InputFileError
 from modrob_cli.io.catalogue import Catalogue, read_assembly
 from modrob_cli.io.documents import kind_of, read_document
 from modrob_cli.io.yaml_loader import load_yaml
+from modrob_cli.model.log import UsedLog
 from modrob_cli.model.robot import Robot
 from modrob_cli.schema import RobotDocument
 
@@ -16,10 +17,11 @@ URDF_SUFFIXES = (".urdf", ".xml")
 
 @dataclass(frozen=True)
 class LoadedRobot:
-    """A robot and the files it was read from."""
+    """A robot, the files it was read from, and the logs that its values were fitted to."""
 
     robot: Robot
     files: list[Path]
+    identified_from: tuple[UsedLog, ...] = ()
 
 
 def load_robot(path: Path, catalogue: Catalogue | None = None) -> LoadedRobot:
@@ -45,4 +47,5 @@ def load_robot(path: Path, catalogue: Catalogue | None = None) -> LoadedRobot:
             raise InputFileError(loaded.fault((), f"the key modrob is missing; {message}"))
         raise InputFileError(loaded.fault(("modrob",), f"found {kind!r}, {message}"))
     document, _ = read_document(path, RobotDocument, loaded)
-    return LoadedRobot(document.to_model(), [path])
+    used = tuple(UsedLog(item.log, item.sha256, item.start, item.end) for item in document.identified_from)
+    return LoadedRobot(document.to_model(), [path], used)
