@@ -101,6 +101,21 @@ def test_planar_arm_in_closed_form() -> None:
     assert formulas == friction + rigid
 
 
+def test_spherical_wrist_by_khalils_rules() -> None:
+    """I_yy, mc_z and m of a link move on to the link before (Khalil, Dombre); 0.0748 m is a length of module PB3."""
+    model = base_model(shipped("lwa4p-6"))
+    formulas = [model.formula(k) for k in range(model.count)]
+    for wanted in (
+        "I_zz6",
+        "mc_x6",
+        "I_xx6 - I_yy6",
+        "mc_x5",
+        "mc_y5 + 0.0748 m6 + mc_z6",
+        "I_yz5 - 0.00559504 m6 - 0.0748 mc_z6",
+    ):
+        assert wanted in formulas
+
+
 def test_a_vertical_slide_confuses_weight_and_offset() -> None:
     """Quill of the SCARA: m (ddq - g) is a rotor of mass m with an offset of -9.81 m."""
     model = base_model(shipped("scara"))

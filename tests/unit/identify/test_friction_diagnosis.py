@@ -49,6 +49,15 @@ def test_noise_names_nobody(robot: Robot) -> None:
             assert coupling(train, test, j, fit_joint(train, j, OPTIONS, JointPrior({}, 1.0))) is None
 
 
+def test_a_small_influence_is_no_coupling(robot: Robot) -> None:
+    recording = record(1)
+    effort = recording.log.effort.copy()
+    effort[:, 2] += 0.3 * recording.dq[:, 1]
+    run = prepare_run(robot, replace(recording.log, effort=effort), "torque", 5.0)
+    estimate = fit_joint([run], 2, OPTIONS, JointPrior({}, 1.0))
+    assert coupling([run], [run.between(0.0, 0.0)], 2, estimate) is None
+
+
 def _without_gravity(recording: Recording) -> Recording:
     still = np.zeros_like(recording.q)
     gravity = rigid_torque(recording.q, still, still)

@@ -12,7 +12,7 @@ from modrob_cli.dynamics.newton_euler import nominal_links
 from modrob_cli.dynamics.pinocchio_backend import inverse_dynamics
 from modrob_cli.errors import ShapeError
 from modrob_cli.identify.base_report import base_parameter_report
-from modrob_cli.identify.physical_fit import with_links
+from modrob_cli.identify.physical_fit import physical_robot, with_links
 from modrob_cli.identify.physical_inertia import (
     SMALLEST_RADIUS,
     body_from,
@@ -110,6 +110,25 @@ def test_identified_links_are_real_and_predict_new_motions() -> None:
     assert after[1] < 0.1 * before[1]
     assert after.sum() < 0.2 * before.sum()
     np.testing.assert_allclose(identified.link_frames(np.ones(6)), robot.link_frames(np.ones(6)))
+
+
+def test_robot_of_a_fit_predicts_the_recorded_torque() -> None:
+    """Friction, rotor and links together; the offset is the middle of the disturbance."""
+    robot = shipped("lwa4p-6")
+    run = recording(with_scaled_mass(robot, 3, 1.2), np.random.default_rng(6), noise=0.01)
+    fit = base_parameter_report(robot, [run]).physical
+    assert fit is not None
+    new = physical_robot(robot, fit)
+    tau = inverse_dynamics(new, run.q, run.dq, run.ddq) + new.disturbance.mid
+    for j, joint in enumerate(new.joints):
+        friction = joint.friction.viscous.nominal * run.dq[:, j] + joint.friction.coulomb.nominal * np.sign(
+            run.dq[:, j]
+        )
+        rotor = joint.drive.gear_ratio**2 * float(joint.drive.rotor_inertia.nominal)
+        error = (run.tau[:, j] - tau[:, j] - friction - rotor * run.ddq[:, j])[run.use[:, j]]
+        assert np.sqrt(np.mean(error**2)) < 0.015 * np.sqrt(np.mean(run.tau[:, j] ** 2))
+        assert joint.friction.viscous.is_exact
+    np.testing.assert_allclose(new.disturbance.mid, fit.offset, atol=1e-12)
 
 
 def test_impossible_data_are_mended_before_the_fit() -> None:
