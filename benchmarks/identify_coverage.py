@@ -56,6 +56,8 @@ def main() -> None:
     for j in range(joints):
         for k, term in enumerate(TERMS):
             _report(robot.joint_names[j], term, TRUTH[j, k], found[:, j, k])
+    inside = (found[..., 2] <= TRUTH) & (found[..., 3] >= TRUTH)
+    print(f"all intervals together: {float(np.mean(inside[np.isfinite(found[..., 0])])):.1%} hold the truth")
 
 
 def _report(joint: str, term: str, truth: float, found: Array) -> None:

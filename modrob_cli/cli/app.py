@@ -6,7 +6,22 @@ import typer
 from typer.core import TyperGroup
 
 from modrob_cli import __version__
-from modrob_cli.cli import assemble, bounds, check, demo, init, log, pack, schema, simulate, trajectory, validate
+from modrob_cli.cli import (
+    assemble,
+    bounds,
+    check,
+    collision,
+    demo,
+    identify,
+    init,
+    log,
+    pack,
+    scale,
+    schema,
+    simulate,
+    trajectory,
+    validate,
+)
 from modrob_cli.errors import ModrobError
 
 
@@ -53,7 +68,22 @@ def _main(
     pass
 
 
-for _module in (check, assemble, validate, log, bounds, trajectory, simulate, pack, schema, init, demo):
+for _module in (
+    check,
+    assemble,
+    identify,
+    validate,
+    log,
+    bounds,
+    trajectory,
+    scale,
+    collision,
+    simulate,
+    pack,
+    schema,
+    init,
+    demo,
+):
     _module.register(app)
 
 

@@ -123,7 +123,7 @@ def _chunk(robot: Robot, bare: Robot, middle: Array, radius: Array) -> TorqueBou
         size = np.maximum(drive.magnitude(*down), drive.magnitude(*up))
         lower[i] = (lower[i] + low) - EPS * (np.abs(lower[i]) + size) - TINY
         upper[i] = (upper[i] + high) + EPS * (np.abs(upper[i]) + size) + TINY
-        nominal[i] += drive_nominal(robot.joints[i], middle[1, i], middle[2, i])
+        nominal[i] += drive_nominal(robot.joints[i], middle[1, i], middle[2, i], robot.disturbance[i])
     if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
         raise NumericalError("a torque bound is not finite; check the motion, its box and the model for absurd values")
     return TorqueBounds(*(np.ascontiguousarray(part.T) for part in (nominal, lower, upper)))

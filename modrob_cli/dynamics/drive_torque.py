@@ -63,9 +63,29 @@ def drive_boxes(robot: Robot) -> list[DriveBox]:
     return [DriveBox.of(joint, robot.disturbance[i]) for i, joint in enumerate(robot.joints)]
 
 
-def drive_nominal(joint: Joint, dq: Array, ddq: Array) -> Array:
-    """Nominal friction and rotor torque of one joint, shape (T,); the sign of zero is zero, disturbance is left out."""
+def drive_nominal(joint: Joint, dq: Array, ddq: Array, disturbance: Interval | None = None) -> Array:
+    """Nominal friction, rotor and disturbance torque of one joint, shape (T,).
+
+    Within the velocity band the sign rises along a straight line through zero; a disturbance (shape ()) counts with its
+    member nearest to zero. So the nominal torque lies between the bounds.
+    """
     friction, drive = joint.friction, joint.drive
-    sign = np.where(np.abs(dq) <= friction.velocity_band, 0.0, np.sign(dq))
+    band = friction.velocity_band
+    sign = np.clip(dq / band, -1.0, 1.0) if band > 0.0 else np.sign(dq)
     armature = drive.gear_ratio**2 * drive.rotor_inertia.nominal
-    return np.asarray(friction.viscous.nominal * dq + friction.coulomb.nominal * sign + armature * ddq)
+    constant = 0.0 if disturbance is None else float(np.clip(0.0, disturbance.inf, disturbance.sup))
+    return np.asarray(friction.viscous.nominal * dq + friction.coulomb.nominal * sign + armature * ddq + constant)
+
+
+def torque_limits(robot: Robot) -> tuple[Array, Array]:
+    """Lower and upper limit of the motor torque at each joint, from torque and current limits; infinite if unknown."""
+    ranges = []
+    for joint in robot.joints:
+        low, high = joint.limits.torque or (-np.inf, np.inf)
+        constant, current = joint.drive.torque_constant, joint.limits.current
+        if current is not None and constant is not None:
+            ends = sorted(float(constant * joint.drive.gear_ratio * end) for end in current)
+            low, high = max(low, ends[0]), min(high, ends[1])
+        ranges.append((low, high))
+    ends_of = np.array(ranges)
+    return ends_of[:, 0], ends_of[:, 1]

@@ -159,7 +159,7 @@ def with_drives(prepared: Prepared, ranges: Ranges, q: Array, dq: Array, ddq: Ar
         ends = drive.torque_range(dq[i], ddq[i])
         lower[i] += ends[0]
         upper[i] += ends[1]
-        nominal[i] += drive_nominal(prepared.robot.joints[i], dq[i], ddq[i])
+        nominal[i] += drive_nominal(prepared.robot.joints[i], dq[i], ddq[i], prepared.robot.disturbance[i])
         size[i] += drive.magnitude(dq[i], ddq[i])
     margin = rounding_margin(prepared.robot.dof, size)
     lower, upper = lower - margin, upper + margin

@@ -151,7 +151,7 @@ def _chunk(prepared: _Prepared, q: Array, dq: Array, dq_a: Array, ddq: Array) ->
         ends = _drive_range(drive, dq[i], ddq[i], tolerance[i])
         lower[i] += ends[0]
         upper[i] += ends[1]
-        nominal[i] += drive_nominal(robot.joints[i], dq[i], ddq[i])
+        nominal[i] += drive_nominal(robot.joints[i], dq[i], ddq[i], robot.disturbance[i])
         magnitude[i] += drive.magnitude(dq[i], most[i])
     margin = rounding_margin(robot.dof, magnitude)
     lower, upper = lower - margin, upper + margin

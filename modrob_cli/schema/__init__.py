@@ -5,6 +5,7 @@ from modrob_cli.schema.base import Document
 from modrob_cli.schema.module import ModuleDocument
 from modrob_cli.schema.robot import RobotDocument
 from modrob_cli.schema.scenario import ScenarioDocument
+from modrob_cli.schema.task import TaskDocument
 from modrob_cli.schema.trajectory import TrajectoryDocument
 
 DOCUMENTS: dict[str, type[Document]] = {
@@ -12,6 +13,7 @@ DOCUMENTS: dict[str, type[Document]] = {
     "assembly/1": AssemblyDocument,
     "robot/1": RobotDocument,
     "trajectory/1": TrajectoryDocument,
+    "task/1": TaskDocument,
     "scenario/1": ScenarioDocument,
 }
 """Document kinds by the value of their first key ``modrob``."""
@@ -23,5 +25,6 @@ __all__ = [
     "ModuleDocument",
     "RobotDocument",
     "ScenarioDocument",
+    "TaskDocument",
     "TrajectoryDocument",
 ]

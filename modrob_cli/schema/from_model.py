@@ -40,11 +40,13 @@ def robot_data(robot: Robot, source: str = "", identified_from: Sequence[UsedLog
     if np.any(robot.disturbance.mag > 0.0):
         ends = zip(robot.disturbance.inf, robot.disturbance.sup, strict=True)
         data["disturbance"] = [[float(low), float(high)] for low, high in ends]
-    if identified_from:
-        data["identified_from"] = [
-            {key: value for key, value in asdict(used).items() if value is not None} for used in identified_from
-        ]
-    return data
+    return data | identified_from_data(identified_from)
+
+
+def identified_from_data(used: Sequence[UsedLog]) -> Data:
+    """The logs that values were fitted to, under their key; nothing if there are none."""
+    entries = [{key: value for key, value in asdict(log).items() if value is not None} for log in used]
+    return {"identified_from": entries} if entries else {}
 
 
 def angle_data(angle: float) -> float | str:

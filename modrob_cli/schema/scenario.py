@@ -15,7 +15,7 @@ from modrob_cli.model.body import INERTIA_ENTRIES
 from modrob_cli.model.robot import Robot
 from modrob_cli.model.scenario import Contact, Scenario
 from modrob_cli.schema.base import Document, Name
-from modrob_cli.schema.scenario_parts import ContactSpec, ControlSpec, InitialSpec, SensorsSpec
+from modrob_cli.schema.scenario_parts import ContactSpec, ControlSpec, InitialSpec, SensorsSpec, Size, per_joint
 from modrob_cli.schema.scenario_truth import ExactBodySpec, TruthSpec
 
 MOST_SEED = 2**63 - 1
@@ -52,6 +52,9 @@ class ScenarioDocument(Document):
         default=None, description="body at the end effector, in its frame, that the controller does not know of"
     )
     contacts: Annotated[list[ContactSpec], AfterValidator(_named_once)] = []
+    input_disturbance: Size = Field(
+        default=0.0, description="bound of a random torque beside that of the motors, new at each command [N m] or [N]"
+    )
     sensors: SensorsSpec = SensorsSpec()
     sub_steps: int = Field(default=1, ge=1, le=MOST_SUB_STEPS, description="integration steps per command")
     end_stops: bool = Field(default=True, description="the position limits stop the joints")
@@ -82,6 +85,7 @@ class ScenarioDocument(Document):
         for key in _CHANNELS:
             channel = getattr(self.sensors, key)
             lists += [(("sensors", key, part), getattr(channel, part)) for part in ("noise", "resolution")]
+        lists += [(("input_disturbance",), self.input_disturbance)]
         lists += [(("initial", "q"), self.initial.q), (("initial", "dq"), self.initial.dq)]
         for where, value in lists:
             if isinstance(value, list) and len(value) != robot.dof:
@@ -130,6 +134,7 @@ class ScenarioDocument(Document):
             truth=self.truth.to_model(),
             payload=self.payload.to_model("scenario payload") if self.payload else None,
             contacts=tuple(_contact(spec, robot) for spec in self.contacts),
+            input_disturbance=per_joint(self.input_disturbance),
             sensors=self.sensors.to_model(),
             control=self.control.to_model(),
             seed=self.seed,

@@ -7,6 +7,7 @@ from pydantic import AfterValidator, Discriminator, Field, StringConstraints, Ta
 from pydantic_core import PydanticCustomError
 
 from modrob_cli.model.scenario import (
+    BoundsMethod,
     Channel,
     ContactFrame,
     ContactShape,
@@ -84,11 +85,12 @@ class ControlSpec(Document):
     friction_band: NonNegativeAngle = Field(
         default=0.02, description="up to this velocity the sign is a straight line [rad/s]"
     )
+    bounds: BoundsMethod = Field(default="exact", description="how ia-id and ia-pb bound their perturbation")
 
     def to_model(self) -> Control:
         """Return controller, gains and clock."""
         gains = {name: per_joint(value) for name, value in self.gains.items()}
-        return Control(self.name, gains, self.rate, self.friction, self.friction_band)
+        return Control(self.name, gains, self.rate, self.friction, self.friction_band, self.bounds)
 
 
 class ContactSpec(Document):

@@ -17,10 +17,11 @@ from modrob_cli.identify.bounded_samples import JointSamples, Mask
 from modrob_cli.identify.run import Run
 from modrob_cli.io.outputs import OutputFolder, provenance
 from modrob_cli.io.yaml_writer import yaml_text
+from modrob_cli.model.log import UsedLog
 from modrob_cli.model.robot import Robot
 from modrob_cli.plot.bounded import draw_bounded
 from modrob_cli.schema import RobotDocument
-from modrob_cli.schema.from_model import robot_data
+from modrob_cli.schema.from_model import identified_from_data, robot_data
 from modrob_cli.workflows.bounded_growth import growth_result
 from modrob_cli.workflows.bounded_options import BoundedOptions, requests, with_velocity_bands
 from modrob_cli.workflows.bounded_overlay import write_overlay
@@ -36,6 +37,7 @@ def identify_bounds(
     folder: OutputFolder,
     held_out: Sequence[Run] = (),
     inputs: Sequence[Path] = (),
+    used: Sequence[UsedLog] = (),
 ) -> dict[str, Any]:
     """Find the smallest intervals of friction, rotor and disturbance that put every sample inside the torque bounds.
 
@@ -45,6 +47,7 @@ def identify_bounds(
     folder : open; all files go there
     held_out : runs that the intervals are not found from; how many of their samples lie inside is reported
     inputs : log files, for the record of what the outputs were made from
+    used : stretches of them that ``runs`` cover, for the robot file
 
     Returns
     -------
@@ -81,7 +84,7 @@ def identify_bounds(
     }
     if result["overlay"] is None:
         names = {kind: name for kind, name in names.items() if kind not in ("overlay", "assembly")}
-    folder.write(names["robot"], yaml_text(search.data))
+    folder.write(names["robot"], yaml_text(search.data | identified_from_data(used)))
     folder.write(names["parameters"], parameters_csv(arm, found))
     folder.write(names["samples"], samples_csv(arm, runs, motion, samples, found))
     draw_bounded(bounded_picture(arm, motion, samples, found, search.bounds), folder.stage(names["picture"]))

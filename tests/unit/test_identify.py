@@ -1,4 +1,4 @@
-"""Signals and friction fit against closed forms and simulated joints with known terms."""
+"""Signals, prediction errors and the meaning of effort against closed forms."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,6 @@ import pytest
 from modrob_cli.arrays import Array
 from modrob_cli.errors import NumericalError, ShapeError, UsageError
 from modrob_cli.identify.effort import effort_factors
-from modrob_cli.identify.friction_fit import fit_friction, soft_sign
 from modrob_cli.identify.prediction import prediction_errors
 from modrob_cli.identify.signals import low_pass, prepare
 from modrob_cli.interval import Interval
@@ -95,75 +94,6 @@ def test_log_refuses_times_that_do_not_increase() -> None:
         make_log(np.array([0.0, 1.0, 1.0]), np.zeros((3, 1)))
     with pytest.raises(ShapeError):
         make_log(np.arange(3.0), np.zeros((4, 1)))
-
-
-@pytest.mark.parametrize("recorded", [True, False])
-def test_known_terms_are_found(recorded: bool) -> None:
-    t = even_times()
-    q, dq, ddq = sines(t)
-    # offset, coulomb, viscous, reflected inertia
-    truth = np.array([[0.4, 3.0, 5.0, 0.7], [-0.2, 1.0, 0.5, 0.05]])
-    torque = truth[:, 0] + truth[:, 1] * np.sign(dq) + truth[:, 2] * dq + truth[:, 3] * ddq
-    noise = np.random.default_rng(3).normal(size=torque.shape) * 0.1
-    log = make_log(t, q, dq if recorded else None, torque + noise)
-    signals = prepare(log)
-    fits, extra = fit_friction(signals, signals.effort)
-    # White noise of 0.1 in some 2900 samples: standard errors below 0.01; five of them.
-    for fit, expected in zip(fits, truth, strict=True):
-        np.testing.assert_allclose(fit.values(), expected, rtol=0, atol=0.05)
-        assert fit.notes == ()
-    errors = prediction_errors(signals, torque + noise, extra)
-    for error in errors:
-        assert error.rmse > 0.09
-        assert error.nrmse_low_passed is not None
-        assert error.nrmse is not None
-        assert error.nrmse_low_passed < error.nrmse
-
-
-def test_a_joint_at_rest_gets_an_offset_only() -> None:
-    t = even_times()
-    noise = np.random.default_rng(5).normal(size=(len(t), 2)) * 1e-3
-    q = np.stack([sines(t)[0][:, 0], np.full_like(t, 0.7)], axis=1) + noise
-    signals = prepare(make_log(t, q))
-    fits, extra = fit_friction(signals, np.full_like(signals.q, 2.5))
-    assert (fits[1].viscous, fits[1].coulomb, fits[1].reflected_inertia) == (None, None, None)
-    assert fits[1].offset == pytest.approx(2.5)
-    assert "hardly moves" in fits[1].notes[0]
-    np.testing.assert_allclose(extra[:, 1], 2.5)
-
-
-def test_one_direction_does_not_tell_coulomb_from_offset() -> None:
-    t = even_times()
-    q = (t + 0.1 * np.sin(3 * t))[:, None]
-    dq, ddq = 1 + 0.3 * np.cos(3 * t), -0.9 * np.sin(3 * t)
-    signals = prepare(make_log(t, q))
-    fit = fit_friction(signals, (3.0 + 2.0 * dq + 0.5 * ddq)[:, None])[0][0]
-    assert fit.coulomb is None
-    assert "coulomb" in fit.notes[0]
-    assert fit.viscous == pytest.approx(2.0, abs=1e-3)
-
-
-def test_constant_speeds_do_not_excite_the_inertia() -> None:
-    t = even_times()
-    q = np.abs((t / 3.0) % 2.0 - 1.0)[:, None]
-    signals = prepare(make_log(t, q), cutoff=50.0)
-    fit = fit_friction(signals, np.sign(signals.dq))[0][0]
-    assert fit.viscous is None
-    assert fit.coulomb == pytest.approx(1.0, abs=0.02)
-
-
-def test_negative_terms_are_pointed_out() -> None:
-    t = even_times()
-    q, dq, ddq = sines(t)
-    signals = prepare(make_log(t, q, dq))
-    fit = fit_friction(signals, 2.0 * dq - 0.3 * ddq)[0][0]
-    assert fit.reflected_inertia == pytest.approx(-0.3, abs=1e-3)
-    assert "reflected_inertia" in fit.notes[0]
-
-
-def test_soft_sign() -> None:
-    np.testing.assert_allclose(soft_sign(np.array([-3.0, -0.5, 0.0, 0.25, 1.0]), 0.5), [-1, -1, 0, 0.5, 1])
-    np.testing.assert_allclose(soft_sign(np.array([-1e-9, 0.0, 2.0]), 0.0), [-1, 0, 1])
 
 
 def test_prediction_errors_by_hand() -> None:

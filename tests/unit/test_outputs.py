@@ -152,3 +152,19 @@ def test_provenance_names_version_and_hashes(tmp_path: Path) -> None:
     found = provenance([path, path])
     assert found["modrob"] == __version__
     assert found["inputs"] == {"arm.yaml": "sha256:" + hashlib.sha256(path.read_bytes()).hexdigest()}
+
+
+def test_files_in_a_folder_of_their_own_come_and_go_with_the_others(tmp_path: Path) -> None:
+    with OutputFolder(tmp_path / "out") as folder:
+        folder.write("parts/one.txt", "1")
+        folder.write("parts/two.txt", "2")
+    assert (tmp_path / "out" / "parts" / "two.txt").read_text() == "2"
+
+    def write_and_stop() -> None:
+        with OutputFolder(tmp_path / "new") as folder:
+            folder.write("parts/one.txt", "1")
+            raise ValueError("stop")
+
+    with pytest.raises(ValueError, match="stop"):
+        write_and_stop()
+    assert not (tmp_path / "new").exists()
