@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from modrob_cli.cli import simulate, validate
+from modrob_cli.cli import identify_report, simulate, validate
 from modrob_cli.cli.assemble import show_robot, summary_table
 from modrob_cli.cli.bounds import say_result
 from modrob_cli.cli.check import summary_line
@@ -20,7 +20,7 @@ _DEFAULT = Path("out/demo")
 
 
 def demo(out: OutDir = _DEFAULT, overwrite: Overwrite = False) -> None:
-    """Run the whole chain on the shipped example: check, assemble, draw, bound torques, simulate, validate."""
+    """Run the whole chain on the shipped example, from the catalogue to a validated model."""
     from modrob_cli.workflows import demo as workflow
 
     result = workflow.demo(out, overwrite, announce=lambda step: say(f"\n{step}"))
@@ -46,8 +46,14 @@ def _report(result: "DemoResult", main: str, uncertain: str) -> None:
     say("\nThe log against the model without the payload: a misfit beyond the noise shows that something is missing.\n")
     for log in result.validated["logs"]:
         validate.say_log(log)
+    say("\nAnother arm, whose true parameters differ from its file by up to 5 %: identified from one run,")
+    say("validated with another motion:\n")
+    identify_report.say_result(result.identified)
+    for log in result.held_out["logs"]:
+        validate.say_log(log)
+    say(f"Verdict: {'passed' if result.held_out['passed'] else 'failed'} (NRMSE of every joint at most 0.3)")
     say(f"\nEverything is in {result.folder}/; {result.folder}/README.md says what each file is.")
-    say(f"Look at {result.folder}/pose/{main}.png and the pictures in bounds/, simulated/ and validated/ first.")
+    say(f"Look at {result.folder}/pose/{main}.png, the pictures in bounds/ and simulated/, and *.html first.")
 
 
 def _widening(robot: "AssembledRobot") -> str:

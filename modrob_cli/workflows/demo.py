@@ -12,6 +12,8 @@ from modrob_cli.workflows.assemble import AssembledRobot, assemble
 from modrob_cli.workflows.bounds import bounds
 from modrob_cli.workflows.bounds_method import BoundsOptions
 from modrob_cli.workflows.check import CheckResult, check
+from modrob_cli.workflows.identify import identify
+from modrob_cli.workflows.identify_options import IdentifyOptions
 from modrob_cli.workflows.simulate import simulate
 from modrob_cli.workflows.simulation_study import SimulateOptions
 from modrob_cli.workflows.trajectory import trajectory
@@ -22,7 +24,9 @@ MAIN_ROBOT = "lwa4p-6"
 UNCERTAIN_ROBOT = "lwa4p-6-tol5"
 PAYLOAD_ROBOT = "lwa4p-table34"
 MOTION = "table-b1"
+OTHER_MOTION = "half-b1-6"
 SCENARIO = "payload"
+TRUE_SCENARIO = "box"
 POSE = (0.3, -0.8, 1.6, 0.0, 0.8, 0.0)
 
 _GUIDE = """# What `modrob demo` left here
@@ -43,9 +47,13 @@ _GUIDE = """# What `modrob demo` left here
 | `bounds/{motion}.bounds.json` | the result with versions and hashes |
 | `motion/{motion}.png` | the motion: position, velocity, acceleration, and the limits of the arm |
 | `motion/{motion}.csv`, `motion/{motion}.mcap` | its samples |
+| `simulated/train.mcap`, `simulated/test.mcap` | runs of an arm whose parameters differ from its file by up to 5 % |
+| `identified/{uncertain}.identify.html` | report: friction and rotors from the first run, and how sure that is |
+| `identified/{uncertain}.identified.robot.yaml` | the arm with what was identified; every command reads it |
+| `identified/{uncertain}.validate.html` | report: the identified arm against the second run, another motion |
 | `simulated/payload.mcap` | a simulated run with 2 kg that the controller does not know of; PlotJuggler opens it |
 | `simulated/payload.simulate.png` | how well the arm followed, and the motor torques |
-| `validated/payload.validate.png` | recorded torque against that of the model without the 2 kg |
+| `validated/{main}.validate.html` | report: recorded torque against that of the model without the 2 kg |
 
 The inputs are the shipped `modules/`, `assemblies/`, `trajectories/` and `scenarios/`;
 `modrob init DIR` copies them into a workspace of your own.
@@ -61,6 +69,8 @@ class DemoResult:
     bounds: dict[str, Any]
     simulated: dict[str, Any]
     validated: dict[str, Any]
+    identified: dict[str, Any]
+    held_out: dict[str, Any]
     folder: Path
 
     def robot(self, name: str) -> AssembledRobot:
@@ -69,7 +79,7 @@ class DemoResult:
 
 
 def demo(out: Path, overwrite: bool, announce: Callable[[str], None]) -> DemoResult:
-    """Check the shipped documents, assemble the shipped arms, draw one, bound its torques, simulate and validate it.
+    """Check the shipped documents, assemble the arms, draw one, bound torques, simulate, validate, identify.
 
     ``announce`` is told each step.
 
@@ -92,9 +102,12 @@ def demo(out: Path, overwrite: bool, announce: Callable[[str], None]) -> DemoRes
     announce(f"4. Bound its torques along a motion: modrob bounds {payload.name} {motion.name} -o {out}/bounds")
     found = bounds(payload, motion, BoundsOptions(), out / "bounds", overwrite)
     simulated, validated = _simulate_and_validate(main, motion, out, overwrite, announce)
+    uncertain = next(path for path in paths if path.stem == UNCERTAIN_ROBOT)
+    identified, held_out = _identify_and_validate(uncertain, trajectories, out, overwrite, announce)
+    guide = _GUIDE.replace("{main}", MAIN_ROBOT).replace("{uncertain}", UNCERTAIN_ROBOT).replace("{motion}", MOTION)
     with OutputFolder(out, overwrite) as folder:
-        folder.write("README.md", _GUIDE.replace("{main}", MAIN_ROBOT).replace("{motion}", MOTION))
-    return DemoResult(checked, robots, found, simulated, validated, out)
+        folder.write("README.md", guide)
+    return DemoResult(checked, robots, found, simulated, validated, identified, held_out, out)
 
 
 def _simulate_and_validate(
@@ -110,3 +123,23 @@ def _simulate_and_validate(
     announce(f"7. Validate the model with the log: modrob validate {robot.name} {log} --effort torque")
     validated = validate(robot, [log], ValidateOptions("torque"), out / "validated", overwrite)
     return simulated, validated
+
+
+def _identify_and_validate(
+    robot: Path, trajectories: Path, out: Path, overwrite: bool, announce: Callable[[str], None]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Two runs of an arm that is not quite what its file says: identify from one, validate with the other."""
+    scenario = shipped_folder("scenarios") / f"{TRUE_SCENARIO}.yaml"
+    options = SimulateOptions(scenario=scenario)
+    logs = {name: out / "simulated" / f"{name}.mcap" for name in ("train", "test")}
+    announce(
+        f"8. Two runs of an arm at the edge of its box: modrob simulate {robot.name} ... --scenario {scenario.name}"
+    )
+    for name, motion in (("train", MOTION), ("test", OTHER_MOTION)):
+        simulate(robot, trajectories / f"{motion}.yaml", options, logs[name], overwrite)
+    announce(f"9. Identify from one of them: modrob identify {robot.name} {logs['train']} --effort torque")
+    identified = identify(robot, [logs["train"]], IdentifyOptions("torque"), out / "identified", overwrite)
+    updated = Path(identified["files"]["robot"])
+    announce(f"10. Validate with the other: modrob validate {updated} {logs['test']} --effort torque --max-nrmse 0.3")
+    judging = ValidateOptions("torque", max_nrmse=0.3)
+    return identified, validate(updated, [logs["test"]], judging, out / "identified", overwrite)
