@@ -12,7 +12,7 @@ and for a tensor about the body frame's origin without the quadratic part, which
 square replaced by r' Q r - (R c)' Q (R c).
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,13 +93,21 @@ def sum_of(parts: Iterable[Ball]) -> Ball:
 def link_parameters(robot: Robot, index: int, link: BoxLink) -> list[BoxParameters]:
     """Worst-case parameters behind joint ``index``: one set for all known bodies, one for each uncertain body."""
     bodies = robot.bodies_of(index + 1)
-    known = [_at_origin(placed) for placed in bodies if is_exact(placed.body)]
+    known = known_parameters([placed for placed in bodies if is_exact(placed.body)])
     uncertain = [placed for placed in bodies if not is_exact(placed.body)]
-    found = [_joined(known)] if known else []
+    found = [known] if known is not None else []
     if uncertain:
         terms = BoxTerms.of(link)
         found += [_reduced(placed, terms) for placed in uncertain]
     return found
+
+
+def known_parameters(bodies: Sequence[PlacedBody]) -> BoxParameters | None:
+    """One set of parameters at the link's origin for bodies without any width; None for no bodies."""
+    if not bodies:
+        return None
+    mass, moment, inertia = (sum_of(column) for column in zip(*map(_at_origin, bodies), strict=True))
+    return BoxParameters(mass, inertia, None, moment)
 
 
 def _at_origin(placed: PlacedBody) -> tuple[Ball, Ball, Ball]:
@@ -110,11 +118,6 @@ def _at_origin(placed: PlacedBody) -> tuple[Ball, Ball, Ball]:
     r = arm + Ball.exact(placed.pose[:3, 3].reshape(3, 1, 1, 1))
     shift = _parallel_axis(r) - _parallel_axis(arm) if body.inertia_about == "frame" else _parallel_axis(r)
     return mass, mass * r, _rotated(R, inertia) + mass * shift
-
-
-def _joined(parts: list[tuple[Ball, Ball, Ball]]) -> BoxParameters:
-    mass, moment, inertia = (sum_of(column) for column in zip(*parts, strict=True))
-    return BoxParameters(mass, inertia, None, moment)
 
 
 def _reduced(placed: PlacedBody, terms: BoxTerms) -> BoxParameters:

@@ -13,11 +13,14 @@ import numpy as np
 
 from modrob_cli.arrays import Array, Indices
 from modrob_cli.scaling.forbidden import positive_parts, uncovered
-from modrob_cli.scaling.scaled_torque import ScaledTorques
+from modrob_cli.scaling.scaled_torque import TorqueRanges
 
 TOLERANCE = 1e-9
 """Factors are found to this accuracy, relative; always on the safe side."""
 
+LIMIT_ROUNDING = 2.0**-46
+"""Limits are taken this much tighter: computed roots are those of quadratics whose coefficients are off by a few u,
+and the rounding margins of the torques cover all coefficients but the limit itself."""
 _FIRST_KNOTS = 9
 Intervals = list[tuple[float, float]]
 
@@ -90,7 +93,7 @@ def _largest(A: Array, B: Array, C: Array, a: float, b: float) -> Array:
         return np.where(inside, np.maximum(ends, 0.5 * B * vertex), ends) + C
 
 
-def limit_rows(torques: ScaledTorques, low: Array, high: Array) -> Rows:
+def limit_rows(torques: TorqueRanges, low: Array, high: Array) -> Rows:
     """All limits of torque that are known; ``low`` and ``high`` of shape (n,), infinite where there is none."""
     polynomial = torques.polynomial
     ends = np.stack([high, -low])
@@ -98,10 +101,11 @@ def limit_rows(torques: ScaledTorques, low: Array, high: Array) -> Rows:
     limit = ends[side, joint]
     parts = [getattr(polynomial, key)[side, joint, sample] for key in ("alpha", "beta", "gamma", "gamma_moving")]
     slow = polynomial.slow[joint, sample]
+    limit = limit - LIMIT_ROUNDING * np.abs(limit)
     return Rows(side, joint, sample, parts[0], parts[1], parts[2] - limit, parts[3] - limit, slow)
 
 
-def free_factors(torques: ScaledTorques, rows: Rows, low: float, high: float) -> Intervals:
+def free_factors(torques: TorqueRanges, rows: Rows, low: float, high: float) -> Intervals:
     """Factors of [low, high] that keep all limits, as intervals in order.
 
     Every factor in them is safe; what is left out is unsafe, or nearer to it than :data:`TOLERANCE`.
@@ -122,14 +126,14 @@ def _neighbours(values: list[Array], knots: Array) -> list[tuple[Array, Array]]:
     return [(np.stack(values[k : k + 2]), knots[k : k + 2]) for k in range(len(knots) - 1)]
 
 
-def _rigid(torques: ScaledTorques, rows: Rows, c: float) -> Array:
+def _rigid(torques: TorqueRanges, rows: Rows, c: float) -> Array:
     """R of each row at a factor, shape (K,)."""
     which, place = np.unique(rows.sample, return_inverse=True)
     values = torques.rigid(c * c, None if len(which) == torques.samples else which)
     return np.asarray(values[rows.side, rows.joint, place])
 
 
-def _free_in(torques: ScaledTorques, first: _Piece) -> Intervals:
+def _free_in(torques: TorqueRanges, first: _Piece) -> Intervals:
     """Free factors of one piece; pieces with a difference that matters are halved."""
     found, stack = [], [first]
     while stack:
@@ -148,7 +152,7 @@ def _free_in(torques: ScaledTorques, first: _Piece) -> Intervals:
     return found
 
 
-def _halves(torques: ScaledTorques, piece: _Piece, which: Indices, middle: float) -> list[_Piece]:
+def _halves(torques: TorqueRanges, piece: _Piece, which: Indices, middle: float) -> list[_Piece]:
     """Both parts of a piece, with only those rows that are not kept all over it."""
     rows = piece.rows.picked(which)
     at_a, at_b, before, after = (part[which] for part in (piece.at_a, piece.at_b, piece.before, piece.after))

@@ -11,6 +11,7 @@ unlike [S] (14)-(19), where a payload's mass counts once with gravity and once, 
 """
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -23,6 +24,8 @@ from modrob_cli.dynamics.newton_euler import backward
 from modrob_cli.dynamics.uncertain_body import UncertainBody
 from modrob_cli.model.robot import Robot
 
+_ABOVE = 1.0 + 2.0**-40
+"""At this much more than the velocity band over the speed a joint is certain to be faster than the band."""
 _MORE = 2.0
 """Operations of this module on top of those that the rounding margin of a torque counts."""
 
@@ -32,7 +35,7 @@ class Polynomial:
     """alpha c^2 + beta c + gamma, for upper (0) and mirrored lower side (1) and each joint, shape (2, n, T) each.
 
     ``gamma`` has the sign of the Coulomb torque as an interval, ``gamma_moving`` as the sign of the velocity, which
-    holds for c > ``slow``, shape (n, T).
+    holds for c >= ``slow``, shape (n, T).
     """
 
     alpha: Array
@@ -71,7 +74,9 @@ class ScaledTorques:
             (joint, body, static, dynamic) for (joint, body, static), (_, _, dynamic) in zip(*parts, strict=True)
         ]
         magnitude = torque_magnitude(robot, q, still, still)
-        self.polynomial = _drives(prepared, dq, ddq, magnitude, torque_magnitude(robot, q, dq, ddq) - magnitude)
+        self.polynomial = drive_polynomial(
+            prepared, dq, ddq, magnitude, torque_magnitude(robot, q, dq, ddq) - magnitude
+        )
         self.samples = count
 
     def rigid(self, u: float, which: Indices | None = None) -> Array:
@@ -94,8 +99,11 @@ class ScaledTorques:
         return np.stack([upper, -lower])
 
 
-def _drives(prepared: Prepared, dq: Array, ddq: Array, static: Array, dynamic: Array) -> Polynomial:
-    """Friction, rotor, disturbance and rounding margin; ``static`` and ``dynamic`` are parts of the magnitude."""
+def drive_polynomial(prepared: Prepared, dq: Array, ddq: Array, static: Array, dynamic: Array) -> Polynomial:
+    """Friction, rotor, disturbance and rounding margin, for states of shape (n, T).
+
+    ``static`` and ``dynamic`` are the parts of the torque's magnitude that do not and that do grow with c^2.
+    """
     shape = (2, *dq.shape)
     alpha, beta, gamma, moving = (np.empty(shape) for _ in range(4))
     slow = np.empty(dq.shape)
@@ -103,7 +111,7 @@ def _drives(prepared: Prepared, dq: Array, ddq: Array, static: Array, dynamic: A
     for i, drive in enumerate(prepared.drives):
         speed, push = np.abs(dq[i]), np.abs(ddq[i])
         with np.errstate(divide="ignore", invalid="ignore"):
-            slow[i] = np.where(speed > 0.0, drive.velocity_band / speed, np.inf)
+            slow[i] = np.where(speed > 0.0, drive.velocity_band / speed * _ABOVE, np.inf)
         for side, sign in enumerate((1.0, -1.0)):
             alpha[side, i] = _largest(drive.armature, sign * ddq[i]) + unit * (dynamic[i] + drive.armature[1] * push)
             beta[side, i] = _largest(drive.viscous, sign * dq[i]) + unit * drive.viscous[1] * speed
@@ -112,6 +120,26 @@ def _drives(prepared: Prepared, dq: Array, ddq: Array, static: Array, dynamic: A
             gamma[side, i] = drive.coulomb[1] + rest
             moving[side, i] = _largest(drive.coulomb, sign * np.sign(dq[i])) + rest
     return Polynomial(alpha, beta, gamma, moving, slow)
+
+
+class TorqueRanges(Protocol):
+    """Torque ranges of samples or cells as functions of the factor."""
+
+    polynomial: Polynomial
+    samples: int
+
+    def rigid(self, u: float, which: Indices | None = None) -> Array:
+        """R(u), shape (2, n, T or K); see ``ScaledTorques.rigid``."""
+
+
+def bounds_at(torques: TorqueRanges, c: float) -> Array:
+    """Largest torque and the negative of the smallest at a factor >= 0, shape (2, n, T).
+
+    For c = 0 these are the torques of a motion that is infinitely slow.
+    """
+    p = torques.polynomial
+    gamma = np.where(c >= p.slow, p.gamma_moving, p.gamma)
+    return np.asarray(torques.rigid(c * c) + (p.alpha * c + p.beta) * c + gamma)
 
 
 def _largest(ends: tuple[float, float], rate: Array) -> Array:
