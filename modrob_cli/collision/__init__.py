@@ -1,0 +1,1 @@
+"""Collision thresholds: torque bands no admissible parameter leaves without contact, and their sensitivity."""
