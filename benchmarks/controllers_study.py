@@ -39,6 +39,8 @@ REBUILT = [(*arm, scenario) for arm in ARMS for scenario in ("pid-50", "id-50", 
 LOADED = [("pid-50", None), ("id-50", None), ("id-50", 12500.0), ("pb-afc-50", None), ("pb-afc-50", 500.0)]
 LEARNING = [("lwa4p-6", "fourier-6-repeated", "pb-afc-zero-guess")]
 DELAYS = (0, 2, 5, 10, 15, 20, 30)
+ROBUST = ("ia-id", "ia-pb", "cr", "r-alpha")
+"""Controllers of benchmarks.papers_controllers."""
 PERIOD = 10.0
 """Period of the motion that is repeated [s]."""
 
@@ -146,7 +148,7 @@ def print_delays() -> None:
     print("|---|" + "---|" * len(DELAYS))
     study = study_of("lwa4p-6", "half-b1-6", "id-50")
     said = study.scenario.scenario
-    for name in CONTROLLERS:
+    for name in (name for name in CONTROLLERS if name not in ROBUST):
         cells = []
         for delay in DELAYS:
             sensors = replace(said.sensors, delay=1e-3 * delay)

@@ -1,6 +1,7 @@
 """Speed of closed-loop simulation on one thread: ``python -m benchmarks.simulate_speed [--runs 5]``.
 
-Every shipped controller drives the 6-axis arm through the motion of [D] Table B.1 (18 s) at 1 kHz. Times are those of
+Every shipped controller drives the 6-axis arm through the motion of [D] Table B.1 (18 s) at 1 kHz, and the interval
+controllers also one whose bodies are all uncertain. Times are those of
 the processor (``time.process_time``); the runs of all cases are interleaved, so that a busy minute hits them all. The
 last column is the time per command in calls of ``pin.aba`` in a plain Python loop that keeps its results, in the same
 run: the fourth-order method alone needs four of them. The work is done in a process of its own, with the thread pools
@@ -8,6 +9,7 @@ of BLAS and OpenMP set to one thread.
 """
 
 import argparse
+import itertools
 import os
 import statistics
 import subprocess
@@ -20,7 +22,7 @@ import numpy as np
 
 from modrob_cli.dynamics.pinocchio_backend import build_model
 from modrob_cli.model.robot import Robot
-from modrob_cli.model.scenario import Control, Scenario
+from modrob_cli.model.scenario import BoundsMethod, Control, Scenario
 from modrob_cli.model.trajectory import Trajectory
 from modrob_cli.simulate.closed_loop import ClosedLoop
 from modrob_cli.simulate.control_model import ControlModel
@@ -28,6 +30,7 @@ from modrob_cli.simulate.controllers.interface import ControlTask
 from modrob_cli.simulate.controllers.shipped import CONTROLLERS, make_controller
 from modrob_cli.simulate.truth import true_robot
 from modrob_cli.workflows.robots import load_robot
+from modrob_cli.workflows.simulation_study import published_links
 from modrob_cli.workflows.trajectory_motion import load_trajectory
 
 ROOT = Path(__file__).parents[1]
@@ -37,12 +40,12 @@ REFERENCE = "pin.aba in a Python loop"
 Case = Callable[[], object]
 
 
-def closed_loop(robot: Robot, trajectory: Trajectory, name: str) -> Case:
+def closed_loop(robot: Robot, trajectory: Trajectory, name: str, bounds: BoundsMethod = "exact") -> Case:
     """A run with a new controller."""
 
     def case() -> object:
-        scenario = Scenario(control=Control(rate=RATE))
-        task = ControlTask(ControlModel(robot), trajectory, 1.0 / RATE, scenario.control)
+        scenario = Scenario(control=Control(rate=RATE, bounds=bounds))
+        task = ControlTask(ControlModel(robot), trajectory, 1.0 / RATE, scenario.control, published_links(robot))
         truth = true_robot(robot, scenario.truth, np.random.default_rng(0))
         controller, rng = make_controller(name, task), np.random.default_rng(1)
         return ClosedLoop(robot, truth, trajectory, controller, scenario, np.ones(robot.dof), rng).run()
@@ -83,7 +86,11 @@ def main() -> None:
     robot = load_robot(ROOT / "assemblies" / "lwa4p-6.yaml").robot
     trajectory = load_trajectory(ROOT / "trajectories" / "table-b1.yaml").trajectory
     commands = round(trajectory.duration * RATE)
-    cases = {name: closed_loop(robot, trajectory, name) for name in CONTROLLERS}
+    cases: dict[str, Case] = {name: closed_loop(robot, trajectory, name) for name in CONTROLLERS}
+    uncertain = load_robot(ROOT / "assemblies" / "lwa4p-6-tol5.yaml").robot
+    bounds: tuple[BoundsMethod, ...] = ("exact", "ianea")
+    for name, method in itertools.product(("ia-id", "ia-pb"), bounds):
+        cases[f"{name} {method}, 5 %"] = closed_loop(uncertain, trajectory, name, method)
     found = measured({REFERENCE: pinocchio_loop(robot, commands)} | cases, runs)
     unit = statistics.median(found[REFERENCE])
     print(f"{f'{commands} commands, 6 joints':26}{'x real time: median':>20}{'most':>7}{'us/command':>12}{'calls':>7}")

@@ -7,7 +7,7 @@ import typer
 from modrob_cli.cli.console import print_json
 
 KindName = Annotated[
-    str, typer.Argument(metavar="KIND", help="module/1, assembly/1, robot/1, trajectory/1 or scenario/1.")
+    str, typer.Argument(metavar="KIND", help="module/1, assembly/1, robot/1, trajectory/1, task/1 or scenario/1.")
 ]
 
 

@@ -3,12 +3,15 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from modrob_cli.cli.console import print_json, say, table
 from modrob_cli.cli.options import AsJson, Overwrite
+
+if TYPE_CHECKING:
+    from modrob_cli.model.scenario import BoundsMethod
 
 _HELP = """Simulate an arm that follows a motion, and log it as a real robot would.
 
@@ -22,6 +25,7 @@ _EPILOG = "Example: modrob simulate assemblies/lwa4p-6.yaml trajectories/table-b
 
 _CONTROLLER_HELP = (
     "feedforward-pd, pid, id (inverse dynamics), pb (passivity-based), pb-afc (with adaptive friction compensation), "
+    "robust: ia-id, ia-pb (interval arithmetic), cr (classical), r-alpha; "
     "or your own: FILE.py or FILE.py:NAME, a function that makes one."
 )
 
@@ -42,6 +46,9 @@ def _simulate(
     sweep: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="N runs, each with a robot drawn from the intervals.")
     ] = None,
+    bounds: Annotated[
+        str | None, typer.Option(metavar="exact|ianea", help="How ia-id and ia-pb bound what their model lacks.")
+    ] = None,
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="FILE", help="Log to write; other files get names beside it.")
     ] = Path("out/run.mcap"),
@@ -50,11 +57,14 @@ def _simulate(
 ) -> None:
     import sys
 
-    from modrob_cli.errors import NegativeAnswerError
+    from modrob_cli.errors import NegativeAnswerError, UsageError
     from modrob_cli.workflows.simulate import simulate
     from modrob_cli.workflows.simulation_study import SimulateOptions
 
-    options = SimulateOptions(controller, scenario, seed, sweep)
+    if bounds is not None and bounds not in ("exact", "ianea"):
+        raise UsageError(f"--bounds: found {bounds}, expected exact or ianea")
+    method = cast("BoundsMethod | None", bounds)
+    options = SimulateOptions(controller, scenario, seed, sweep, method)
     with _progress() as report, redirect_stdout(sys.stderr):  # a user's controller may print; stdout is for JSON
         result = simulate(robot, trajectory, options, out, overwrite, report)
     say_result(result)
@@ -114,11 +124,20 @@ def _say_run(result: dict[str, Any]) -> None:
         span = f"{contact['start']:g} .. {contact['end']:g} s"
         unit = next(item["torque_unit"] for item in result["joints"] if item["name"] == joint)
         say(f"  contact {contact['name']}: {contact['force']:.3g} N, {span}; up to {torque:.3g} {unit} at {joint}")
+    _say_perturbation(result["perturbation"])
     for name in result["truth"]["kept_nominal"]:
         say(f"  note: {name} kept its nominal values: hardly any member of its box is a real body")
     if result["real_time_factor"] is not None:
         speed = f"{result['real_time_factor']:.3g} times faster than real time"
         say(f"  {speed}; energy balance closes to {result['energy_error']:.1e}")
+
+
+def _say_perturbation(found: dict[str, Any] | None) -> None:
+    """How the bounds of the perturbation did."""
+    if found is None:
+        return
+    widths = ", ".join(f"{joint['name']} {_short(joint['mean_width'])}" for joint in found["joints"])
+    say(f"  perturbation outside its {found['bounds']} bounds: {found['violations']} samples; mean widths: {widths}")
 
 
 def _say_runs(runs: list[dict[str, Any]]) -> None:

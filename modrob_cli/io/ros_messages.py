@@ -120,6 +120,17 @@ def joint_truth(names: Sequence[str]) -> MessageLayout:
     return MessageLayout("modrob_msgs/msg/JointTruth", _definition(text, *_HEADER_TYPES), fields)
 
 
+PERTURBATION_LISTS = ("perturbation", "lower", "upper")
+"""Lists of a ``modrob_msgs/msg/JointPerturbation``."""
+
+
+def joint_perturbation(names: Sequence[str]) -> MessageLayout:
+    """``modrob_msgs/msg/JointPerturbation``, our own: torque that a model lacks, with its bounds; n of each list."""
+    text = "std_msgs/Header header\nstring[] name\n" + "".join(f"float64[] {part}\n" for part in PERTURBATION_LISTS)
+    fields = [*_header(), TextsField(tuple(names)), *[DoublesField(len(names))] * len(PERTURBATION_LISTS)]
+    return MessageLayout("modrob_msgs/msg/JointPerturbation", _definition(text, *_HEADER_TYPES), fields)
+
+
 def joint_trajectory(
     names: Sequence[str],
     times: Stamps,

@@ -17,6 +17,7 @@ SensedEffort = Literal["torque", "current", "motor-torque"]
 SensedVelocity = Literal["measured", "differentiated"]
 GainValue = float | tuple[float, ...]
 FrictionFrom = Literal["measured", "desired", "none"]
+BoundsMethod = Literal["exact", "ianea"]
 
 
 @dataclass(frozen=True)
@@ -129,6 +130,7 @@ class Control:
     friction : velocity from which the controller computes the friction torque that it compensates; none: it does not
     friction_band : the sign of velocities up to this is replaced by a straight line [rad/s] or [m/s], so that Coulomb
         compensation does not chatter at rest; 0 for the sign itself
+    bounds : how interval controllers bound their perturbation: exactly, or by the published algorithm
     """
 
     name: str | None = None
@@ -136,6 +138,7 @@ class Control:
     rate: float = 1000.0
     friction: FrictionFrom = "measured"
     friction_band: float = 0.02
+    bounds: BoundsMethod = "exact"
 
 
 @dataclass(frozen=True)
@@ -145,6 +148,8 @@ class Scenario:
     Attributes
     ----------
     payload : body at the end effector, in its frame, that the true robot carries and the controller does not know of
+    input_disturbance : largest torque that is added to that of the motors, uniform between its negative and itself, a
+        new one at each command; a number for all joints or one each
     sub_steps : integration steps per command
     end_stops : the position limits stop the joints (without rebound)
     saturation : the torque and current limits cut the commands
@@ -155,6 +160,7 @@ class Scenario:
     truth: Truth = field(default_factory=Truth)
     payload: RigidBody | None = None
     contacts: tuple[Contact, ...] = ()
+    input_disturbance: GainValue = 0.0
     sensors: Sensors = field(default_factory=Sensors)
     control: Control = field(default_factory=Control)
     seed: int = 0

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from modrob_cli.arrays import Array
+from modrob_cli.dynamics.drive_torque import torque_limits
 from modrob_cli.errors import UsageError
 from modrob_cli.model.robot import Robot
 from modrob_cli.model.scenario import Scenario
 from modrob_cli.model.trajectory import Trajectory
-from modrob_cli.simulate.controllers.interface import Controller, Desired
+from modrob_cli.simulate.controllers.interface import BoundsPerturbation, Controller, Desired
+from modrob_cli.simulate.perturbation import perturbation_columns
 from modrob_cli.simulate.plant import Plant
 from modrob_cli.simulate.recording import EnergyBalance, Recorder, Run
 from modrob_cli.simulate.sensors import SensorBank
@@ -86,6 +88,7 @@ class ClosedLoop:
         samples = self._steps // every + 1
         bank = SensorBank(scenario.sensors, every * self._period, samples, self.effort_factor, self.rng)
         recorder, state = Recorder(samples, dof), self._start(plant, desired[0])
+        disturbance = self._disturbance(len(times))
         balance, look = EnergyBalance(plant, state), max(self._steps // _LOOKS, 1)
         low, high = torque_limits(self.robot) if scenario.saturation else (np.full(dof, -np.inf), np.full(dof, np.inf))
         cut, diverged = np.zeros(dof), None
@@ -103,20 +106,32 @@ class ClosedLoop:
             before, applied = applied, np.minimum(np.maximum(commanded, low), high)
             cut += applied != commanded
             q, dq = state.q, state.dq  # the step makes new ones
+            acting = applied if disturbance is None else applied + disturbance[k]
             if k == self._steps:
-                ddq = plant.accelerations(state, applied)
+                ddq = plant.accelerations(state, acting)
             else:
-                ddq = plant.advance(state, applied, h)
+                ddq = plant.advance(state, acting, h)
                 for _ in range(1, scenario.sub_steps):
-                    plant.advance(state, applied, h)
+                    plant.advance(state, acting, h)
             if sampled:
                 recorder.add(t, (q, dq, ddq, commanded, applied, applied if before is None else before, *bank.latest))
+                if isinstance(self.controller, BoundsPerturbation):
+                    recorder.perturbations.append(self.controller.perturbation)
             if k % look == 0 or k == self._steps:
                 balance.check(state)
                 progress(k / self._steps)
         progress(1.0)
-        recording = recorder.recording(desired[::every], plant, bank, h)
+        disturbing = None if disturbance is None else disturbance[::every]
+        recording = recorder.recording(desired[::every], plant, bank, h, disturbing)
+        recording.values.update(perturbation_columns(self.truth, scenario.control.bounds, recorder.perturbations))
         return Run(self.truth, recording, diverged, cut / (k + 1), tuple(plant.hits), balance.relative_error())
+
+    def _disturbance(self, count: int) -> Array | None:
+        """Random torques beside the motors', one for each command, shape (count, n); None where there are none."""
+        sizes = np.asarray(self.scenario.input_disturbance, dtype=float)
+        if sizes.ndim and len(sizes) != self.robot.dof:
+            raise UsageError(f"input_disturbance: found {len(sizes)} values for {self.robot.dof} joints")
+        return self.rng.uniform(-1.0, 1.0, (count, self.robot.dof)) * sizes if sizes.any() else None
 
     def _start(self, plant: Plant, first: Array) -> State:
         """State at the beginning; ``first`` is the desired one, shape (3, n)."""
@@ -159,17 +174,3 @@ def samples_every(scenario: Scenario) -> int:
         message = f"found sensors at {rate:g} Hz and a controller at {control:g} Hz"
         raise UsageError(f"{message}, expected the rate of the controller to be a multiple of that of the sensors")
     return every
-
-
-def torque_limits(robot: Robot) -> tuple[Array, Array]:
-    """Lower and upper limit of the motor torque at each joint, from torque and current limits; infinite if unknown."""
-    ranges = []
-    for joint in robot.joints:
-        low, high = joint.limits.torque or (-np.inf, np.inf)
-        constant, current = joint.drive.torque_constant, joint.limits.current
-        if current is not None and constant is not None:
-            ends = sorted(float(constant * joint.drive.gear_ratio * end) for end in current)
-            low, high = max(low, ends[0]), min(high, ends[1])
-        ranges.append((low, high))
-    ends_of = np.array(ranges)
-    return ends_of[:, 0], ends_of[:, 1]

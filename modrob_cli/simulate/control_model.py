@@ -50,6 +50,10 @@ class ControlModel:
         second = self._pin.rnea(self._weightless, self._data, q, 0.5 * (dq - dq_a), self._still)
         return np.asarray(first - second)
 
+    def coriolis(self, q: Array, dq: Array) -> Array:
+        """C(q, dq), shape (n, n); Pinocchio's, with which dM/dt - 2 C is skew-symmetric too."""
+        return np.array(self._pin.computeCoriolisMatrix(self._model, self._data, q, dq))
+
     def inertia(self, q: Array) -> Array:
         """M(q) with the rotors, shape (n, n)."""
         upper = np.triu(self._pin.crba(self._model, self._data, q))

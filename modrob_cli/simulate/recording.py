@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from modrob_cli.arrays import Array
+from modrob_cli.simulate.controllers.interface import Perturbation
 from modrob_cli.simulate.plant import Plant, StopHit
 from modrob_cli.simulate.sensors import SensorBank
 from modrob_cli.simulate.steps import State
@@ -24,9 +25,11 @@ class Recording:
     desired : position, velocity, acceleration, shape (K, 3, n)
     values : shape (K, n) by name: true ``q``, ``dq``, ``ddq``; ``friction``, torque against the motor, with the
         constant torque of disturbance and friction band and what holds joints at rest or at their end stops;
-        ``external``, torque of contacts; ``commanded`` and ``applied`` motor torque; ``q_measured``, ``dq_measured``
-        and ``effort`` as logged. ``ddq``, ``friction``, ``external``, ``commanded`` and ``applied`` are those just
-        after the sample; ``effort`` is measured just before the new command acts.
+        ``external``, torque of contacts and random disturbances; ``commanded`` and ``applied`` motor torque;
+        ``q_measured``, ``dq_measured`` and ``effort`` as logged. ``ddq``, ``friction``, ``external``, ``commanded`` and
+        ``applied`` are those just after the sample; ``effort`` is measured just before the new command acts. Where the
+        controller bounds its perturbation: ``perturbation``, ``phi_lower`` and ``phi_upper``, see
+        :mod:`modrob_cli.simulate.perturbation`.
     """
 
     t: Array
@@ -62,6 +65,7 @@ class Recorder:
         self.values = {key: np.zeros((samples, dof)) for key in FIELDS}
         self.t = np.empty(samples)
         self.count = 0
+        self.perturbations: list[Perturbation] = []
 
     def add(self, t: float, rows: tuple[Array, ...]) -> None:
         """Take one sample: shape (n,) for each of :data:`FIELDS`."""
@@ -71,13 +75,16 @@ class Recorder:
             values[k] = row
         self.count += 1
 
-    def recording(self, desired: Array, plant: Plant, bank: SensorBank, h: float) -> Recording:
+    def recording(
+        self, desired: Array, plant: Plant, bank: SensorBank, h: float, disturbance: Array | None = None
+    ) -> Recording:
         """What was collected, with what follows from it.
 
         Parameters
         ----------
         desired : of all samples or more, shape (K, 3, n)
         h : length of a step [s]
+        disturbance : random torque at all samples or more, shape (K, n)
         """
         t = self.t[: self.count]
         values = {key: value[: self.count] for key, value in self.values.items()}
@@ -85,6 +92,8 @@ class Recorder:
         external = np.zeros_like(effort)
         if plant.contacts:
             external[:] = [plant.external_torque(*row, h) for row in zip(t.tolist(), values["q"], strict=True)]
+        if disturbance is not None:
+            external += disturbance[: self.count]
         states = zip(values["q"], values["dq"], values["ddq"], strict=True)
         moving = np.reshape([plant.dynamics.inverse(*state) for state in states], effort.shape)
         friction = values["applied"] + external - moving

@@ -90,8 +90,8 @@ def _errors(result: Entry, fitted: Fitted) -> list[Block]:
             found = entry[part] or {}
             row += [found.get(key) for key in ("nrmse", "nrmse_low_passed", "rmse", "max_error")]
         rows.append((*row, entry["unit"]))
-    header = ("joint", "fitted: NRMSE", "below cut-off", "RMSE", "largest")
-    header += ("held out: NRMSE", "below cut-off", "RMSE", "largest", "unit")
+    held = ("held out: NRMSE", "below cut-off", "RMSE", "largest", "unit")
+    header = ("joint", "fitted: NRMSE", "below cut-off", "RMSE", "largest", *held)
     where = "the held-out part" if fitted.test else "the fitted part; nothing was held out"
     caption = f"NRMSE: RMS error / RMS of the recorded torque. Judged on {where}."
     return [Table(header, tuple(rows), caption, tones)]

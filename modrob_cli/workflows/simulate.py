@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from modrob_cli.dynamics.drive_torque import torque_limits
 from modrob_cli.errors import UsageError
 from modrob_cli.io.outputs import OutputFolder
+from modrob_cli.plot.perturbation import PerturbationPicture, draw_perturbation
 from modrob_cli.plot.simulation import SimulationPicture, draw_simulation
-from modrob_cli.simulate.closed_loop import torque_limits
 from modrob_cli.simulate.recording import Run
 from modrob_cli.workflows.simulation_log import write_log
 from modrob_cli.workflows.simulation_study import (
@@ -66,6 +67,8 @@ def simulate(
 
 def _single(study: Study, folder: OutputFolder, log: Path, progress: Progress) -> dict[str, Any]:
     names = {"log": log.name, "json": f"{log.stem}.simulate.json", "picture": f"{log.stem}.simulate.png"}
+    if study.bounds_perturbation:
+        names["perturbation"] = f"{log.stem}.perturbation.png"
     folder.claim(list(names.values()))
     run, seconds = run_one(study, 0, lambda done: progress("Simulating", done))
     robot, scenario = study.robot.robot, study.scenario.scenario
@@ -73,9 +76,32 @@ def _single(study: Study, folder: OutputFolder, log: Path, progress: Progress) -
     result = {**header(study), **run_summary(robot, run, scenario), "provenance": study_provenance(study)}
     folder.write(names["json"], json.dumps(result, indent=2, allow_nan=False) + "\n")
     draw_simulation(_picture(study, run), folder.stage(names["picture"]))
+    if "perturbation" not in run.recording.values:
+        names.pop("perturbation", None)
+    else:
+        draw_perturbation(_perturbation_picture(study, run), folder.stage(names["perturbation"]))
     speed = run.recording.t[-1] / seconds if len(run.recording.t) > 1 and seconds > 0.0 else None
     files = {kind: str(log.parent / name) for kind, name in names.items()}
     return {**result, "real_time_factor": speed, "files": files}
+
+
+def _perturbation_picture(study: Study, run: Run) -> PerturbationPicture:
+    robot, control, recording = study.robot.robot, study.scenario.scenario.control, run.recording
+    values = recording.values
+    precision = control.gains.get("precision")
+    return PerturbationPicture(
+        f"{robot.name}: {study.controller} on {study.motion.name}",
+        f"scenario {study.scenario.scenario.name}; bounds of the perturbation: {control.bounds}",
+        recording.t,
+        np.linalg.norm(values["q"] - recording.desired[:, 0], axis=1),
+        np.linalg.norm(values["commanded"], axis=1),
+        values["perturbation"],
+        values["phi_lower"],
+        values["phi_upper"],
+        robot.joint_names,
+        tuple("N m" if joint.type == "revolute" else "N" for joint in robot.joints),
+        None if precision is None else float(np.min(precision)),
+    )
 
 
 def _picture(study: Study, run: Run) -> SimulationPicture:

@@ -9,7 +9,7 @@ import numpy as np
 from modrob_cli.arrays import Array
 from modrob_cli.io.cdr_layout import Stamps
 from modrob_cli.io.mcap_writer import Series, write_mcap
-from modrob_cli.io.ros_messages import controller_state, joint_state, joint_truth, wrench_stamped
+from modrob_cli.io.ros_messages import controller_state, joint_perturbation, joint_state, joint_truth, wrench_stamped
 from modrob_cli.model.robot import Robot
 from modrob_cli.model.scenario import Contact, Scenario
 from modrob_cli.simulate.recording import Recording, Run
@@ -19,6 +19,7 @@ START = 946_684_800 * 10**9
 files."""
 
 JOINT_STATES, CONTROLLER_STATE, TRUTH, CONTACTS = "/joint_states", "/controller_state", "/truth", "/contacts"
+PERTURBATION = "/perturbation"
 
 
 def write_log(robot: Robot, run: Run, scenario: Scenario, notes: Mapping[str, str], path: Path) -> None:
@@ -26,7 +27,8 @@ def write_log(robot: Robot, run: Run, scenario: Scenario, notes: Mapping[str, st
 
     ``/joint_states``: what the sensors gave; ``/controller_state``: desired, measured and the commanded torque;
     ``/truth``: what really happened; ``/contacts/NAME``: force of each contact in the base frame, zero outside its
-    window. ``notes`` become the metadata record ``modrob.simulation``, beside the labels of the contacts.
+    window; ``/perturbation``, where the controller bounds it: what its model lacks, and the bounds. ``notes`` become
+    the metadata record ``modrob.simulation``, beside the labels of the contacts.
 
     Raises
     ------
@@ -44,6 +46,9 @@ def write_log(robot: Robot, run: Run, scenario: Scenario, notes: Mapping[str, st
         Series(TRUTH, joint_truth(names), stamps, np.hstack(true)),
         *(_contact_series(robot, contact, recording, stamps) for contact in scenario.contacts),
     ]
+    if "perturbation" in values:
+        known = np.hstack([values[key] for key in ("perturbation", "phi_lower", "phi_upper")])
+        series.append(Series(PERTURBATION, joint_perturbation(names), stamps, known))
     labels = [
         {"name": contact.name, "link": contact.link, "start": contact.start, "end": contact.end}
         for contact in scenario.contacts

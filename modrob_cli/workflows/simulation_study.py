@@ -9,16 +9,20 @@ from typing import Any
 
 import numpy as np
 
+from modrob_cli.assembly.dh_synthesis import dh_table
+from modrob_cli.assembly.interval_tight import tight_intervals
+from modrob_cli.dynamics.ianea_links import LinkBoxes
 from modrob_cli.errors import NegativeAnswerError, UsageError
 from modrob_cli.identify.effort import effort_factors
 from modrob_cli.io.outputs import provenance
 from modrob_cli.io.python_controller import controller_file
 from modrob_cli.model.robot import Robot
+from modrob_cli.model.scenario import BoundsMethod
 from modrob_cli.model.trajectory_extremes import Violation, violations
 from modrob_cli.simulate.closed_loop import ClosedLoop
 from modrob_cli.simulate.control_model import ControlModel
 from modrob_cli.simulate.controllers.interface import Controller, ControlTask
-from modrob_cli.simulate.controllers.shipped import CONTROLLERS
+from modrob_cli.simulate.controllers.shipped import CONTROLLERS, bounds_perturbation
 from modrob_cli.simulate.recording import Run
 from modrob_cli.simulate.truth import true_robot
 from modrob_cli.workflows.robots import LoadedRobot, load_robot
@@ -40,12 +44,14 @@ class SimulateOptions:
     scenario : scenario document
     seed : of all that is drawn
     sweep : number of robots drawn from the box; None for one run
+    bounds : how interval controllers bound their perturbation
     """
 
     controller: str | None = None
     scenario: Path | None = None
     seed: int | None = None
     sweep: int | None = None
+    bounds: BoundsMethod | None = None
 
 
 @dataclass(frozen=True)
@@ -58,14 +64,27 @@ class Study:
     controller: str
     warnings: list[str]
 
+    @property
+    def bounds_perturbation(self) -> bool:
+        """Whether the controller bounds its perturbation."""
+        return bounds_perturbation(self.controller)
+
     def task(self) -> ControlTask:
         """What a controller is made from."""
-        control = self.scenario.scenario.control
-        return ControlTask(ControlModel(self.robot.robot), self.motion.trajectory, 1.0 / control.rate, control)
+        robot, control = self.robot.robot, self.scenario.scenario.control
+        links = published_links(robot) if control.bounds == "ianea" else None
+        return ControlTask(ControlModel(robot), self.motion.trajectory, 1.0 / control.rate, control, links)
 
     def make(self) -> Controller:
         """A controller without memory of earlier runs."""
         return load_user_controller(self.controller, self.task())
+
+
+def published_links(robot: Robot) -> LinkBoxes:
+    """Link parameters for the published algorithm: tight, in the D-H frames."""
+    frames = dh_table(robot).frames
+    tight = tight_intervals(robot, frames)
+    return LinkBoxes(tight.mass, tight.com, tight.inertia_com, frames)
 
 
 def read_study(robot_path: Path, motion_path: Path, options: SimulateOptions) -> Study:
@@ -76,6 +95,8 @@ def read_study(robot_path: Path, motion_path: Path, options: SimulateOptions) ->
     scenario = loaded.scenario
     if options.seed is not None:
         scenario = replace(scenario, seed=options.seed)
+    if options.bounds is not None:
+        scenario = replace(scenario, control=replace(scenario.control, bounds=options.bounds))
     warnings = list(motion.warnings)
     if options.sweep is not None:
         if not 1 <= options.sweep <= MOST_RUNS:

@@ -8,6 +8,7 @@ import numpy as np
 from modrob_cli.arrays import Array
 from modrob_cli.model.robot import Robot
 from modrob_cli.model.scenario import Scenario
+from modrob_cli.simulate.perturbation import violations
 from modrob_cli.simulate.recording import Run
 from modrob_cli.simulate.truth import TrueRobot
 
@@ -25,6 +26,7 @@ def run_summary(robot: Robot, run: Run, scenario: Scenario) -> dict[str, Any]:
         "end_stops": [{"joint": robot.joints[hit.joint].name, "time": hit.t, "speed": hit.speed} for hit in run.hits],
         "contacts": [_contact(robot, run, scenario, k) for k in range(len(scenario.contacts))],
         "energy_error": run.energy_error,
+        "perturbation": _perturbation(robot, run, scenario),
         "truth": truth_summary(run.truth),
     }
 
@@ -72,6 +74,26 @@ def _contact(robot: Robot, run: Run, scenario: Scenario, k: int) -> dict[str, An
         "force": float(np.linalg.norm(contact.force)),
         "largest_torque": dict(zip(robot.joint_names, largest.tolist(), strict=True)),
     }
+
+
+def _perturbation(robot: Robot, run: Run, scenario: Scenario) -> dict[str, Any] | None:
+    """How the true perturbation lies in the controller's bounds; None for controllers without."""
+    values = run.recording.values
+    if "perturbation" not in values:
+        return None
+    w, lower, upper = (values[key] for key in ("perturbation", "phi_lower", "phi_upper"))
+    counts, beyond = violations(w, lower, upper)
+    joints = [
+        {
+            "name": joint.name,
+            "mean_width": _finite(float((upper - lower)[:, j].mean())),
+            "max_perturbation": _largest(w[:, j]),
+            "violations": int(counts[j]),
+            "largest_violation": _finite(float(beyond[j])),
+        }
+        for j, joint in enumerate(robot.joints)
+    ]
+    return {"bounds": scenario.control.bounds, "violations": int(counts.sum()), "joints": joints}
 
 
 def truth_summary(truth: TrueRobot) -> dict[str, Any]:

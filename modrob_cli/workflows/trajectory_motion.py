@@ -19,6 +19,7 @@ from modrob_cli.model.motion import MotionPiece
 from modrob_cli.model.robot import Robot
 from modrob_cli.model.trajectory import Trajectory
 from modrob_cli.schema import TrajectoryDocument
+from modrob_cli.workflows.task_motion import is_task, read_task
 
 DEFAULT_RATE = 100.0
 CSV_SUFFIX, MCAP_SUFFIX = ".csv", ".mcap"
@@ -74,7 +75,7 @@ class LoadedTrajectory:
 
 
 def load_trajectory(path: Path, robot: Robot | None = None, topic: str | None = None) -> LoadedTrajectory:
-    """Read a motion: ``trajectory/1``, JointTrajectory as YAML or JSON, samples as CSV, or MCAP.
+    """Read a motion: ``trajectory/1``, ``task/1``, JointTrajectory as YAML or JSON, samples as CSV, or MCAP.
 
     Parameters
     ----------
@@ -86,7 +87,7 @@ def load_trajectory(path: Path, robot: Robot | None = None, topic: str | None = 
     InputFileError
         With all faults of the file, or if its joints are not those of the robot.
     UsageError
-        If a topic is named and the file has none.
+        If a topic is named and the file has none, or a task has no arm to do it.
     """
     suffix = path.suffix.lower()
     names = robot.joint_names if robot is not None else None
@@ -99,7 +100,11 @@ def load_trajectory(path: Path, robot: Robot | None = None, topic: str | None = 
     else:
         text = load_motion_text(path)
         at = find_joint_trajectory(text)
-        loaded = _document(path, text) if at is None else _through(path, read_joint_trajectory(text, at), robot)
+        if is_task(text):
+            given, name = read_task(text, robot)
+            loaded = replace(_through(path, given, robot), name=name)
+        else:
+            loaded = _document(path, text) if at is None else _through(path, read_joint_trajectory(text, at), robot)
     if robot is not None:
         loaded.check_joints(robot)
     return loaded

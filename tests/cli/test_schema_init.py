@@ -14,7 +14,7 @@ def run(*arguments: object) -> Result:
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
-@pytest.mark.parametrize("kind", ["module/1", "assembly/1", "robot/1", "robot", "trajectory/1", "scenario/1"])
+@pytest.mark.parametrize("kind", ["module/1", "assembly/1", "robot/1", "robot", "trajectory/1", "task/1", "scenario/1"])
 def test_schema_is_printed(kind: str) -> None:
     result = run("schema", kind)
     assert result.exit_code == 0

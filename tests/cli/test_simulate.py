@@ -81,6 +81,7 @@ def collected(messages: Any) -> tuple[Columns, dict[str, Array]]:
         "/truth": (
             "position", "velocity", "acceleration", "motor_torque", "friction_torque", "external_torque",
         ),
+        "/perturbation": ("perturbation", "lower", "upper"),
         "/controller_state": ("reference.positions", "reference.velocities", "reference.accelerations",
                               "feedback.positions", "error.velocities", "output.effort"),
     }  # fmt: skip
@@ -261,3 +262,44 @@ def test_log_is_validated_without_naming_a_topic(modrob: Modrob, move: Path) -> 
     assert result.exit_code == 0, result.stderr
     joints = json.loads(result.stdout)["logs"][0]["joints"]
     assert max(joint["nrmse"] for joint in joints) < 0.5
+
+
+@pytest.mark.parametrize("bounds", ["exact", "ianea"])
+def test_interval_controllers_log_their_bounds(modrob: Modrob, move: Path, bounds: str) -> None:
+    result = run(modrob, move, "--controller", "ia-pb", "--bounds", bounds, "--sweep", 1, "--json", robot=UNSURE)
+    assert result.exit_code == 0, result.output
+    single = run(modrob, move, "--controller", "ia-id", "--bounds", bounds, "--json", robot=UNSURE, log="one/run.mcap")
+    assert single.exit_code == 0, single.output
+    for text in (json.loads(result.stdout)["runs"][0], json.loads(single.stdout)):
+        found = text["perturbation"]
+        assert found["bounds"] == bounds
+        assert found["violations"] == 0
+        assert all(joint["mean_width"] > 0.0 and joint["violations"] == 0 for joint in found["joints"])
+    assert (move.parent / "one" / "run.perturbation.png").stat().st_size > 10_000
+    read = by_mcap(move.parent / "one" / "run.mcap")[0]["/perturbation"]
+    inside = (read["lower"] <= read["perturbation"]) & (read["perturbation"] <= read["upper"])
+    assert read["perturbation"].shape == (1001, 6)
+    assert inside.all()
+    # the true robot is the nominal one; only near standstill its friction is not the straight line of friction_band
+    assert np.median(np.abs(read["perturbation"])) < 1e-9
+
+
+def test_unknown_bounds_are_refused(modrob: Modrob, move: Path) -> None:
+    result = run(modrob, move, "--controller", "ia-pb", "--bounds", "best", robot=UNSURE)
+    assert result.exit_code == 2
+    assert "found best, expected exact or ianea" in result.output
+
+
+def test_controllers_without_bounds_have_no_perturbation(modrob: Modrob, move: Path) -> None:
+    result = run(modrob, move, "--controller", "id", "--json")
+    assert json.loads(result.stdout)["perturbation"] is None
+    assert not (move.parent / "out" / "run.perturbation.png").exists()
+
+
+def test_a_task_of_the_tool_is_simulated(modrob: Modrob, tmp_path: Path) -> None:
+    task = "modrob: task/1\nname: t\nstart: [0, -1.7, -1.8, 0.4, -1.4, 0]\nframe: start\n"
+    (tmp_path / "task.yaml").write_text(f"{task}moves:\n- {{duration: 0.5, xyz: [0, 0.01, 0]}}\n")
+    log = tmp_path / "out" / "run.mcap"
+    result = modrob("simulate", ARM, tmp_path / "task.yaml", "--controller", "id", "-o", log, "--json")
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["duration"] == 1.0  # half a second to come to rest

@@ -3,7 +3,7 @@
 import numpy as np
 
 from modrob_cli.arrays import Array
-from modrob_cli.simulate.closed_loop import torque_limits
+from modrob_cli.dynamics.drive_torque import torque_limits
 from modrob_cli.simulate.controllers.interface import ControlTask
 
 

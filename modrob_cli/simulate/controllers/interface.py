@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
 from modrob_cli.arrays import Array
+from modrob_cli.dynamics.ianea_links import LinkBoxes
 from modrob_cli.errors import UsageError
 from modrob_cli.model.scenario import Control, GainValue
 from modrob_cli.model.trajectory import Trajectory
@@ -40,6 +41,32 @@ class Controller(Protocol):
         ...
 
 
+class Perturbation(NamedTuple):
+    """What a controller knew of its perturbation w at its last command, shape (n,) each. [D] (3.6), (3.26).
+
+    Attributes
+    ----------
+    q, dq : measured state;  dq_a, ddq_a : what C and M are multiplied by
+    nominal : nominal torque there, with the friction that is compensated
+    lower, upper : [Phi], bounds of w = torque of the true arm there - nominal
+    """
+
+    q: Array
+    dq: Array
+    dq_a: Array
+    ddq_a: Array
+    nominal: Array
+    lower: Array
+    upper: Array
+
+
+@runtime_checkable
+class BoundsPerturbation(Protocol):
+    """A controller that bounds its perturbation; ``perturbation`` is that of the last command."""
+
+    perturbation: Perturbation
+
+
 @dataclass(frozen=True)
 class ControlTask:
     """What a controller is made from.
@@ -50,12 +77,14 @@ class ControlTask:
     trajectory : the planned motion
     period : time between two commands [s]
     control : gains, and how friction is compensated
+    links : interval parameters of the links in their D-H frames; only needed for ``bounds: ianea``
     """
 
     model: ControlModel
     trajectory: Trajectory
     period: float
     control: Control
+    links: LinkBoxes | None = None
 
     def gain(self, name: str, default: GainValue | Array | None = None, sign: Sign = "any") -> Array:
         """One gain for each joint, shape (n,).

@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 from modrob_cli.arrays import Array
+from modrob_cli.dynamics.drive_torque import torque_limits
 from modrob_cli.dynamics.pinocchio_backend import build_model
 from modrob_cli.errors import NumericalError, UsageError
 from modrob_cli.model.joint import Drive, Limits
@@ -15,7 +16,7 @@ from modrob_cli.model.scenario import Channel, Contact, Control, Scenario, Senso
 from modrob_cli.model.trajectory import Trajectory
 from modrob_cli.model.trajectory_curves import SineCurve
 from modrob_cli.model.uncertain import Uncertain
-from modrob_cli.simulate.closed_loop import ClosedLoop, torque_limits
+from modrob_cli.simulate.closed_loop import ClosedLoop
 from modrob_cli.simulate.controllers.interface import Controller, Desired
 from modrob_cli.simulate.recording import Run
 from modrob_cli.simulate.steps import State
