@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from modrob_cli.cli import identify_report, simulate, validate
+from modrob_cli.cli import collision, identify_report, scale, simulate, validate
 from modrob_cli.cli.assemble import show_robot, summary_table
 from modrob_cli.cli.bounds import say_result
 from modrob_cli.cli.check import summary_line
@@ -28,6 +28,8 @@ def demo(out: OutDir = _DEFAULT, overwrite: Overwrite = False) -> None:
 
 
 def _report(result: "DemoResult", main: str, uncertain: str) -> None:
+    from modrob_cli.workflows import demo as workflow
+
     say(f"\nThe catalogue: {summary_line(result.checked)}")
     for warned in result.checked.warnings:
         say(f"  {Path(warned.fault.file).name}: {warned.fault.path}: {warned.fault.message}")
@@ -52,6 +54,11 @@ def _report(result: "DemoResult", main: str, uncertain: str) -> None:
     for log in result.held_out["logs"]:
         validate.say_log(log)
     say(f"Verdict: {'passed' if result.held_out['passed'] else 'failed'} (NRMSE of every joint at most 0.3)")
+    say("\nHow fast the motion of the scaling paper may be run, for every last link of 1.5 to 3 kg:")
+    scale.say_result(result.scaled)
+    say("\nAn arm of which friction, masses and inertias are known to intervals only: a run without contact, and one")
+    say("with a hit at 2 s and a push at 15 s:")
+    collision.say_result(result.collision, workflow.collision_options())
     say(f"\nEverything is in {result.folder}/; {result.folder}/README.md says what each file is.")
     say(f"Look at {result.folder}/pose/{main}.png, the pictures in bounds/ and simulated/, and *.html first.")
 

@@ -12,8 +12,12 @@ from modrob_cli.workflows.assemble import AssembledRobot, assemble
 from modrob_cli.workflows.bounds import bounds
 from modrob_cli.workflows.bounds_method import BoundsOptions
 from modrob_cli.workflows.check import CheckResult, check
+from modrob_cli.workflows.collision import collision
+from modrob_cli.workflows.collision_options import CollisionOptions, parse_filter
 from modrob_cli.workflows.identify import identify
 from modrob_cli.workflows.identify_options import IdentifyOptions
+from modrob_cli.workflows.scale import scale
+from modrob_cli.workflows.scale_problem import ScaleOptions
 from modrob_cli.workflows.simulate import simulate
 from modrob_cli.workflows.simulation_study import SimulateOptions
 from modrob_cli.workflows.trajectory import trajectory
@@ -27,6 +31,10 @@ MOTION = "table-b1"
 OTHER_MOTION = "half-b1-6"
 SCENARIO = "payload"
 TRUE_SCENARIO = "box"
+SCALED_MOTION = "s-iv-a"
+CURRENT_LIMITS = (8.0, 8.0, 8.0, 8.0, 2.0, 2.0)
+COLLISION_ROBOT = "lwa4p-table34-friction"
+COLLISION_SCENARIOS = ("no-contact", "hit-and-push")
 POSE = (0.3, -0.8, 1.6, 0.0, 0.8, 0.0)
 
 _GUIDE = """# What `modrob demo` left here
@@ -51,6 +59,9 @@ _GUIDE = """# What `modrob demo` left here
 | `identified/{uncertain}.identify.html` | report: friction and rotors from the first run, and how sure that is |
 | `identified/{uncertain}.identified.robot.yaml` | the arm with what was identified; every command reads it |
 | `identified/{uncertain}.validate.html` | report: the identified arm against the second run, another motion |
+| `scaled/{scaled}.scale.html` | report: how fast a motion may be run for every payload that the file admits |
+| `scaled/{scaled}.certificate.json` | the proof; `modrob scale --verify` checks it |
+| `collision/{collision}.collision.html` | report: a run without contact, one with a hit and a push |
 | `simulated/payload.mcap` | a simulated run with 2 kg that the controller does not know of; PlotJuggler opens it |
 | `simulated/payload.simulate.png` | how well the arm followed, and the motor torques |
 | `validated/{main}.validate.html` | report: recorded torque against that of the model without the 2 kg |
@@ -71,6 +82,8 @@ class DemoResult:
     validated: dict[str, Any]
     identified: dict[str, Any]
     held_out: dict[str, Any]
+    scaled: dict[str, Any]
+    collision: dict[str, Any]
     folder: Path
 
     def robot(self, name: str) -> AssembledRobot:
@@ -104,10 +117,14 @@ def demo(out: Path, overwrite: bool, announce: Callable[[str], None]) -> DemoRes
     simulated, validated = _simulate_and_validate(main, motion, out, overwrite, announce)
     uncertain = next(path for path in paths if path.stem == UNCERTAIN_ROBOT)
     identified, held_out = _identify_and_validate(uncertain, trajectories, out, overwrite, announce)
+    scaled = _scale(payload, trajectories, out, overwrite, announce)
+    found_contacts = _detect(assemblies, motion, out, overwrite, announce)
     guide = _GUIDE.replace("{main}", MAIN_ROBOT).replace("{uncertain}", UNCERTAIN_ROBOT).replace("{motion}", MOTION)
+    guide = guide.replace("{scaled}", SCALED_MOTION).replace("{collision}", COLLISION_ROBOT)
     with OutputFolder(out, overwrite) as folder:
         folder.write("README.md", guide)
-    return DemoResult(checked, robots, found, simulated, validated, identified, held_out, out)
+    results = (simulated, validated, identified, held_out, scaled, found_contacts)
+    return DemoResult(checked, robots, found, *results, out)
 
 
 def _simulate_and_validate(
@@ -143,3 +160,38 @@ def _identify_and_validate(
     announce(f"10. Validate with the other: modrob validate {updated} {logs['test']} --effort torque --max-nrmse 0.3")
     judging = ValidateOptions("torque", max_nrmse=0.3)
     return identified, validate(updated, [logs["test"]], judging, out / "identified", overwrite)
+
+
+def _scale(
+    robot: Path, trajectories: Path, out: Path, overwrite: bool, announce: Callable[[str], None]
+) -> dict[str, Any]:
+    """The largest factor that is safe for every payload, proven between the samples too."""
+    motion = trajectories / f"{SCALED_MOTION}.yaml"
+    currents = ",".join(f"{limit:g}" for limit in CURRENT_LIMITS)
+    announce(f"11. Run a motion as fast as is safe: modrob scale {robot.name} {motion.name} --certify")
+    announce(f"    --current-limits {currents} --velocity-limits none --acceleration-limits none -o {out}/scaled")
+    current = tuple((-limit, limit) for limit in CURRENT_LIMITS)
+    limits = (("current", current), ("velocity", (None,)), ("acceleration", (None,)))
+    return scale(robot, motion, ScaleOptions(certify=True, limits=limits), out / "scaled", overwrite)
+
+
+def _detect(
+    assemblies: Path, motion: Path, out: Path, overwrite: bool, announce: Callable[[str], None]
+) -> dict[str, Any]:
+    """Two simulated runs of an arm that is known to its intervals only: without contact, and with a hit and a push."""
+    robot = assemblies / f"{COLLISION_ROBOT}.yaml"
+    announce(f"12. Two runs, one of them with contacts: modrob simulate {robot.name} {motion.name} --scenario ...")
+    logs = []
+    for name in COLLISION_SCENARIOS:
+        logs.append(out / "simulated" / f"{name}.mcap")
+        options = SimulateOptions(scenario=shipped_folder("scenarios") / f"{name}.yaml")
+        simulate(robot, motion, options, logs[-1], overwrite)
+    announce(f"13. Find the contacts: modrob collision {robot.name} {logs[0].name} {logs[1].name} --effort current")
+    announce("    --ddq-tolerance 1 --q-noise 2e-6 --dq-noise 1e-4 --effort-noise 0.05 --filter butterworth2:10")
+    return collision(robot, logs, collision_options(), out / "collision", overwrite)
+
+
+def collision_options() -> CollisionOptions:
+    """What the scenarios say of the sensors, and how far the acceleration may be from the desired one."""
+    noise: dict[str, Any] = {"q_noise": [2e-6], "dq_noise": [1e-4], "effort_noise": [0.05]}
+    return CollisionOptions("current", filter=parse_filter("butterworth2:10"), ddq_tolerance=[1.0], **noise)
