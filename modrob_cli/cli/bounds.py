@@ -1,8 +1,6 @@
 """``modrob bounds``: torque bounds over a motion, and where their width comes from."""
 
 import enum
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,6 +8,7 @@ import typer
 
 from modrob_cli.cli.console import print_json, say, table
 from modrob_cli.cli.options import DEFAULT_OUT, AsJson, OutDir, Overwrite, numbers
+from modrob_cli.cli.progress import progress_bar
 
 _HELP = """Bound the joint torques along a motion, for every admissible value of every uncertain parameter.
 
@@ -73,27 +72,11 @@ def _bounds(
         numbers(q_noise, "--q-noise"),
         numbers(dq_noise, "--dq-noise"),
     )
-    with _progress() as report:
-        result = bounds(robot, motion, options, out, overwrite, report, rate, topic)
+    with progress_bar("Bounding") as report:
+        result = bounds(robot, motion, options, out, overwrite, lambda fraction: report("", fraction), rate, topic)
     say_result(result)
     if as_json:
         print_json(result)
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[float], None]]:
-    """Show a progress bar if there is somebody to see it."""
-    import sys
-
-    if not sys.stderr.isatty():
-        yield lambda fraction: None
-        return
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("Bounding", total=1.0)
-        yield lambda fraction: progress.update(task, completed=fraction)
 
 
 def say_result(result: dict[str, Any]) -> None:

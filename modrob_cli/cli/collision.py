@@ -1,6 +1,6 @@
 """``modrob collision``: thresholds, events, sensitivity."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -8,6 +8,7 @@ import typer
 
 from modrob_cli.cli.log_options import JointMap, Publisher, StrictLog, TimeOption, Topic, log_options
 from modrob_cli.cli.options import DEFAULT_OUT, AsJson, OutDir, Overwrite, numbers
+from modrob_cli.cli.progress import track
 
 if TYPE_CHECKING:
     from modrob_cli.workflows.collision_options import CollisionOptions
@@ -177,24 +178,12 @@ def _collision(
         cutoff,
         compare,
     )
-    result = collision(robot, logs, options, out, overwrite, _track)
+    result = collision(robot, logs, options, out, overwrite, track)
     say_result(result, options)
     if as_json:
         print_json(result)
     if fail_on_collision and result["collision"]:
         raise NegativeAnswerError("\n".join(_against(result)))
-
-
-def _track(paths: Sequence[Path]) -> Iterable[Path]:
-    """Show a progress bar if there is something to wait for and somebody to see it."""
-    import sys
-
-    if len(paths) < 2 or not sys.stderr.isatty():
-        return paths
-    from rich.console import Console
-    from rich.progress import track
-
-    return track(paths, "Reading", console=Console(stderr=True), transient=True)
 
 
 def _against(result: dict[str, Any]) -> list[str]:

@@ -1,13 +1,12 @@
 """The options of ``modrob trajectory --optimize-excitation`` and what they do."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from modrob_cli.cli.console import print_json, say, table
+from modrob_cli.cli.progress import progress_bar
 
 _ONLY = "With --optimize-excitation: "
 
@@ -77,8 +76,8 @@ def run_excitation(
     if plain.get("objective", "log-det") not in ("log-det", "condition"):
         raise UsageError(f"--objective: found {plain['objective']!r}, expected log-det or condition")
     request = ExcitationRequest(**plain, limits=limits)
-    with _progress() as report:
-        result = excitation(robot, request, out, rate, overwrite, formats, report)
+    with progress_bar("Searching") as report:
+        result = excitation(robot, request, out, rate, overwrite, formats, lambda fraction: report("", fraction))
     _say(result)
     if as_json:
         print_json(result)
@@ -102,22 +101,6 @@ def ranges(text: str, option: str) -> list[tuple[float, float]]:
             raise UsageError(f"{option}: found {part.strip()!r}, expected low:high or one number")
         out.append((ends[0], ends[1]) if len(ends) == 2 else (-ends[0], ends[0]))
     return out
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[float], None]]:
-    """Show a progress bar if there is somebody to see it."""
-    import sys
-
-    if not sys.stderr.isatty():
-        yield lambda fraction: None
-        return
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("Searching", total=1.0)
-        yield lambda fraction: progress.update(task, completed=fraction)
 
 
 def _say(result: dict[str, Any]) -> None:

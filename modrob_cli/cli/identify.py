@@ -1,13 +1,13 @@
 """``modrob identify``: friction, rotor inertia and offset from logs, with their uncertainty."""
 
-from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from modrob_cli.cli.log_options import JointMap, Publisher, StrictLog, TimeOption, Topic, log_options
+from modrob_cli.cli.log_options import Effort, JointMap, Publisher, StrictLog, TimeOption, Topic, log_options, positive
 from modrob_cli.cli.options import DEFAULT_OUT, AsJson, OutDir, Overwrite, numbers
+from modrob_cli.cli.progress import track
 
 if TYPE_CHECKING:
     from modrob_cli.workflows.bounded_options import BoundedOptions
@@ -23,11 +23,6 @@ that hold every sample; with --rigid-body also base parameters, and which link's
 
 _EPILOG = "Example: modrob identify robot.urdf run.mcap --effort torque -o out/identify"
 
-_EFFORT_HELP = (
-    "What the log calls effort (required, never guessed): torque = at the joint [N m] (prismatic: [N]); "
-    "motor-torque = at the motor [N m], times gear_ratio; current = of the motor [A], times torque_constant and "
-    "gear_ratio; net-torque = at the joint, without gravity."
-)
 _FRICTION_HELP = (
     "Friction terms: viscous, coulomb, asymmetric (another viscous friction in each direction), stribeck (more "
     "friction at low speed), load (Coulomb friction that grows with the load)."
@@ -51,24 +46,10 @@ def register(app: typer.Typer) -> None:
     app.command("identify", help=_HELP, epilog=_EPILOG, no_args_is_help=True)(_identify)
 
 
-def _effort(value: str) -> str:
-    kinds = ("torque", "current", "motor-torque", "net-torque")
-    if value not in kinds:
-        raise typer.BadParameter(f"found {value!r}, expected {', '.join(kinds)}")
-    return value
-
-
-def _positive(value: float | None) -> float | None:
-    # Written so that NaN fails too.
-    if value is not None and not 0.0 < value < float("inf"):
-        raise typer.BadParameter(f"found {value}, expected a number > 0")
-    return value
-
-
 def _identify(
     robot: Annotated[Path, typer.Argument(metavar="ROBOT", help="URDF, robot/1 or assembly/1 file.")],
     logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP or CSV files.")],
-    effort: Annotated[str, typer.Option(callback=_effort, metavar="KIND", help=_EFFORT_HELP)],
+    effort: Effort,
     topic: Topic = None,
     joint_map: JointMap = None,
     time: TimeOption = "header",
@@ -76,7 +57,7 @@ def _identify(
     publisher: Publisher = None,
     cutoff: Annotated[
         float | None,
-        typer.Option(callback=_positive, metavar="HZ", help="Low-pass; where left out, chosen from the spectra."),
+        typer.Option(callback=positive, metavar="HZ", help="Low-pass; where left out, chosen from the spectra."),
     ] = None,
     holdout: Annotated[
         float, typer.Option(metavar="SHARE", help="Share of each log at its end that the fit does not see; 0 for none.")
@@ -96,7 +77,7 @@ def _identify(
     ] = True,
     max_nrmse: Annotated[
         float | None,
-        typer.Option(callback=_positive, metavar="X", help="Largest NRMSE of any joint that passes; else exit code 4."),
+        typer.Option(callback=positive, metavar="X", help="Largest NRMSE of any joint that passes; else exit code 4."),
     ] = None,
     bounds: Annotated[
         bool, typer.Option("--bounds", help="Also find the smallest intervals that hold every sample.")
@@ -134,7 +115,7 @@ def _identify(
         bounds=_bounded(bounds, effort_noise, outliers, velocity_band, spread, ddq_tolerance, filtered_torque),
         rigid_body=rigid_body,
     )
-    result = identify(robot, logs, options, out, overwrite, _track)
+    result = identify(robot, logs, options, out, overwrite, track)
     say_result(result)
     if as_json:
         print_json(result)
@@ -175,15 +156,3 @@ def _bounded(
         spread=answer,
         torque="filtered" if filtered_torque else "recorded",
     )
-
-
-def _track(paths: Sequence[Path]) -> Iterable[Path]:
-    """Show a progress bar if there is something to wait for and somebody to see it."""
-    import sys
-
-    if len(paths) < 2 or not sys.stderr.isatty():
-        return paths
-    from rich.console import Console
-    from rich.progress import track
-
-    return track(paths, "Reading", console=Console(stderr=True), transient=True)

@@ -1,6 +1,5 @@
 """``modrob log``: what is in a log, and logs from one format to another."""
 
-from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -8,6 +7,7 @@ import typer
 
 from modrob_cli.cli.log_options import JointMap, Publisher, StrictLog, TimeOption, Topic, log_options
 from modrob_cli.cli.options import AsJson, Overwrite
+from modrob_cli.cli.progress import track
 
 _HELP = "Look into recorded logs (log info), and convert them between MCAP and CSV (log convert)."
 
@@ -49,7 +49,7 @@ def _info(
     from modrob_cli.cli.console import print_json
     from modrob_cli.workflows.log_info import log_info
 
-    result = log_info(logs, log_options(topic, joint_map, time, strict, publisher), _track)
+    result = log_info(logs, log_options(topic, joint_map, time, strict, publisher), track)
     for log in result["logs"]:
         _say_log(log)
     if as_json:
@@ -86,18 +86,6 @@ def _convert(
     say(f"wrote {target}")
     if as_json:
         print_json(result)
-
-
-def _track(paths: Sequence[Path]) -> Iterable[Path]:
-    """Show a progress bar if there is something to wait for and somebody to see it."""
-    import sys
-
-    if len(paths) < 2 or not sys.stderr.isatty():
-        return paths
-    from rich.console import Console
-    from rich.progress import track
-
-    return track(paths, "Reading", console=Console(stderr=True), transient=True)
 
 
 def _say_log(log: dict[str, Any]) -> None:

@@ -14,6 +14,34 @@ def _time(value: str) -> str:
     return value
 
 
+def _effort(value: str) -> str:
+    kinds = ("torque", "current", "motor-torque", "net-torque")
+    if value not in kinds:
+        raise typer.BadParameter(f"found {value!r}, expected {', '.join(kinds)}")
+    return value
+
+
+def positive(value: float | None) -> float | None:
+    """Refuse numbers that are not positive and finite.
+
+    Raises
+    ------
+    BadParameter
+        Saying what was found.
+    """
+    # Written so that NaN fails too.
+    if value is not None and not 0.0 < value < float("inf"):
+        raise typer.BadParameter(f"found {value}, expected a number > 0")
+    return value
+
+
+_EFFORT_HELP = (
+    "What the log calls effort (required, never guessed): torque = at the joint [N m] (prismatic: [N]); "
+    "motor-torque = at the motor [N m], times gear_ratio; current = of the motor [A], times torque_constant and "
+    "gear_ratio. Both constants come from ROBOT. net-torque = at the joint, without gravity (as commanded on top of a "
+    "gravity compensation): predictions leave gravity out."
+)
+Effort = Annotated[str, typer.Option(callback=_effort, metavar="KIND", help=_EFFORT_HELP)]
 Topic = Annotated[str | None, typer.Option("--topic", metavar="NAME", help="Topic of the joint states.")]
 JointMap = Annotated[
     str | None, typer.Option("--map", metavar="LOG=ROBOT,...", help="Joints of the log and what the robot calls them.")

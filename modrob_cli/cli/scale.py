@@ -1,8 +1,6 @@
 """``modrob scale``: as fast as is safe, with a certificate."""
 
 import enum
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,6 +8,7 @@ import typer
 
 from modrob_cli.cli.console import print_json, say, table
 from modrob_cli.cli.options import DEFAULT_OUT, AsJson, OutDir, Overwrite, numbers
+from modrob_cli.cli.progress import progress_bar
 
 _HELP = """Find the largest constant factor by which a motion may be sped up (or has to be slowed down).
 
@@ -102,7 +101,7 @@ def _scale(
     }  # fmt: skip
     limits = tuple((name, _ranges(text, f"--{name}-limits")) for name, text in given.items() if text is not None)
     options = ScaleOptions(method.value, certify, gap, min_factor, max_factor, rate, limits)
-    with _progress() as report:
+    with progress_bar("Scaling") as report:
         result = scale(robot, trajectory, options, out, overwrite, report, topic)
     say_result(result)
     if as_json:
@@ -116,7 +115,7 @@ def _verify(path: Path, robot: Path | None, trajectory: Path | None, as_json: bo
     from modrob_cli.errors import NegativeAnswerError
     from modrob_cli.workflows.scale_verify import verify
 
-    with _progress() as report:
+    with progress_bar("Scaling") as report:
         found = verify(path, robot, trajectory, lambda done: report("Checking", done))
     if as_json:
         print_json(found.data)
@@ -148,22 +147,6 @@ def _ranges(text: str, option: str) -> tuple[tuple[float, float] | None, ...]:
             raise UsageError(f"{option}: found {part.strip()!r}, expected a limit > 0, or LOW:HIGH")
         out.append((ends[0], ends[1]) if len(ends) == 2 else (-ends[0], ends[0]))
     return tuple(out)
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str, float], None]]:
-    """Show a progress bar if there is somebody to see it."""
-    import sys
-
-    if not sys.stderr.isatty():
-        yield lambda what, fraction: None
-        return
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("Scaling", total=1.0)
-        yield lambda what, fraction: progress.update(task, description=what, completed=fraction)
 
 
 def say_result(result: dict[str, Any]) -> None:

@@ -1,7 +1,6 @@
 """``modrob simulate``: an arm that follows a motion under a controller, without the arm."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
@@ -9,6 +8,7 @@ import typer
 
 from modrob_cli.cli.console import print_json, say, table
 from modrob_cli.cli.options import AsJson, Overwrite
+from modrob_cli.cli.progress import progress_bar
 
 if TYPE_CHECKING:
     from modrob_cli.model.scenario import BoundsMethod
@@ -65,7 +65,8 @@ def _simulate(
         raise UsageError(f"--bounds: found {bounds}, expected exact or ianea")
     method = cast("BoundsMethod | None", bounds)
     options = SimulateOptions(controller, scenario, seed, sweep, method)
-    with _progress() as report, redirect_stdout(sys.stderr):  # a user's controller may print; stdout is for JSON
+    # A user's controller may print; stdout is for JSON.
+    with progress_bar("Simulating") as report, redirect_stdout(sys.stderr):
         result = simulate(robot, trajectory, options, out, overwrite, report)
     say_result(result)
     if as_json:
@@ -75,22 +76,6 @@ def _simulate(
     if gone:
         where = f"after {gone[0]['diverged']:.4g} s" if len(runs) == 1 else f"in {len(gone)} of {len(runs)} runs"
         raise NegativeAnswerError(f"the closed loop of {result['controller']} ran away {where}")
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str, float], None]]:
-    """Show a progress bar if there is somebody to see it."""
-    import sys
-
-    if not sys.stderr.isatty():
-        yield lambda what, fraction: None
-        return
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("Simulating", total=1.0)
-        yield lambda what, fraction: progress.update(task, description=what, completed=fraction)
 
 
 def say_result(result: dict[str, Any]) -> None:

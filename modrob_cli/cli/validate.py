@@ -1,13 +1,13 @@
 """``modrob validate``: predicted against recorded torque."""
 
-from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from modrob_cli.cli.log_options import JointMap, Publisher, StrictLog, TimeOption, Topic, log_options
+from modrob_cli.cli.log_options import Effort, JointMap, Publisher, StrictLog, TimeOption, Topic, log_options, positive
 from modrob_cli.cli.options import DEFAULT_OUT, AsJson, OutDir, Overwrite
+from modrob_cli.cli.progress import track
 
 if TYPE_CHECKING:
     from modrob_cli.identify.effort import EffortKind
@@ -23,13 +23,6 @@ identified from do not count. Writes an HTML report, JUnit XML, and for each log
 
 _EPILOG = "Example: modrob validate robot.urdf run.mcap --effort torque --max-nrmse 0.2 -o out/validate"
 
-_EFFORT_HELP = (
-    "What the log calls effort (required, never guessed): torque = at the joint [N m] (prismatic: [N]); "
-    "motor-torque = at the motor [N m], times gear_ratio; current = of the motor [A], times torque_constant and "
-    "gear_ratio. Both constants come from ROBOT. net-torque = at the joint, without gravity (as commanded on top of a "
-    "gravity compensation): predictions leave gravity out."
-)
-
 
 _SHOWN = 8
 
@@ -39,13 +32,6 @@ def register(app: typer.Typer) -> None:
     app.command("validate", help=_HELP, epilog=_EPILOG, no_args_is_help=True)(_validate)
 
 
-def _effort(value: str) -> str:
-    kinds = ("torque", "current", "motor-torque", "net-torque")
-    if value not in kinds:
-        raise typer.BadParameter(f"found {value!r}, expected {', '.join(kinds)}")
-    return value
-
-
 def _friction(value: str | None) -> str | None:
     kinds = ("file", "held-out", "in-sample")
     if value is not None and value not in kinds:
@@ -53,17 +39,10 @@ def _friction(value: str | None) -> str | None:
     return value
 
 
-def _positive(value: float | None) -> float | None:
-    # Written so that NaN fails too.
-    if value is not None and not 0.0 < value < float("inf"):
-        raise typer.BadParameter(f"found {value}, expected a number > 0")
-    return value
-
-
 def _validate(
     robot: Annotated[Path, typer.Argument(metavar="ROBOT", help="URDF, robot/1 or assembly/1 file.")],
     logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP or CSV files.")],
-    effort: Annotated[str, typer.Option(callback=_effort, metavar="KIND", help=_EFFORT_HELP)],
+    effort: Effort,
     topic: Topic = None,
     joint_map: JointMap = None,
     time: TimeOption = "header",
@@ -71,7 +50,7 @@ def _validate(
     publisher: Publisher = None,
     cutoff: Annotated[
         float | None,
-        typer.Option(callback=_positive, metavar="HZ", help="Low-pass of the motion; else chosen from the spectrum."),
+        typer.Option(callback=positive, metavar="HZ", help="Low-pass of the motion; else chosen from the spectrum."),
     ] = None,
     friction: Annotated[
         str | None,
@@ -86,11 +65,11 @@ def _validate(
     ] = 0.4,
     max_nrmse: Annotated[
         float | None,
-        typer.Option(callback=_positive, metavar="X", help="Largest NRMSE of any joint that passes; else exit code 4."),
+        typer.Option(callback=positive, metavar="X", help="Largest NRMSE of any joint that passes; else exit code 4."),
     ] = None,
     min_inside: Annotated[
         float | None,
-        typer.Option(callback=_positive, metavar="Y", help="Least fraction of samples inside the bounds that passes."),
+        typer.Option(callback=positive, metavar="Y", help="Least fraction of samples inside the bounds that passes."),
     ] = None,
     accept_fitted: Annotated[
         bool, typer.Option("--accept-fitted", help="Give a verdict also on data that values were fitted to.")
@@ -108,7 +87,7 @@ def _validate(
     source: FrictionFrom | None = friction  # type: ignore[assignment]
     reading = log_options(topic, joint_map, time, strict, publisher)
     options = ValidateOptions(kind, reading, cutoff, source, holdout, max_nrmse, min_inside, accept_fitted)
-    result = validate(robot, logs, options, out, overwrite, _track)
+    result = validate(robot, logs, options, out, overwrite, track)
     for log in result["logs"]:
         say_log(log)
     _say_end(result)
@@ -132,18 +111,6 @@ def _against(result: dict[str, Any]) -> list[str]:
         ratio = "no torque recorded" if joint["nrmse"] is None else f"NRMSE {joint['nrmse']:.3f}"
         lines.append(f"{log}: {joint['name']}: {ratio}, {joint['inside']:.1%} inside the bounds")
     return lines[:_SHOWN] + ([f"and {len(lines) - _SHOWN} more"] if len(lines) > _SHOWN else [])
-
-
-def _track(paths: Sequence[Path]) -> Iterable[Path]:
-    """Show a progress bar if there is something to wait for and somebody to see it."""
-    import sys
-
-    if len(paths) < 2 or not sys.stderr.isatty():
-        return paths
-    from rich.console import Console
-    from rich.progress import track
-
-    return track(paths, "Validating", console=Console(stderr=True), transient=True)
 
 
 def say_log(log: dict[str, Any]) -> None:
