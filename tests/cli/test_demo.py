@@ -18,4 +18,3 @@ def test_demo_leaves_what_it_says(tmp_path: Path) -> None:
         assert (out / pattern.replace("NAME", "scara")).is_file(), pattern
     assert "PB3.2" in result.stderr
     assert CliRunner().invoke(app, ["demo", "-o", str(out)]).exit_code == 6
-    assert CliRunner().invoke(app, ["demo", "-o", str(out), "--overwrite"]).exit_code == 0
