@@ -125,7 +125,7 @@ def torque_band(
     Returns
     -------
     TorqueBounds
-        Outward. Nominal torque: at the middle of each box, the sign of the friction counts 0 within its velocity band.
+        Outward. Nominal torque: at the middle of each box, see :func:`modrob_cli.dynamics.drive_torque.drive_nominal`.
 
     Raises
     ------
@@ -153,7 +153,7 @@ def torque_band(
         low, high = drive.torque_range(*down)[0], drive.torque_range(*up)[1]
         lower[:, i] += low - EPS * (np.abs(lower[:, i]) + size) - TINY
         upper[:, i] += high + EPS * (np.abs(upper[:, i]) + size) + TINY
-        nominal[:, i] += drive_nominal(robot.joints[i], motion.dq[:, i], motion.ddq[:, i])
+        nominal[:, i] += drive_nominal(robot.joints[i], motion.dq[:, i], motion.ddq[:, i], robot.disturbance[i])
     if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
         raise NumericalError("a torque band is not finite; check the motion and the model for absurd values")
     return TorqueBounds(nominal, lower, upper)

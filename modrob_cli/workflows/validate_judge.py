@@ -8,6 +8,7 @@ import numpy as np
 
 from modrob_cli.arrays import Array
 from modrob_cli.dynamics.exact_bounds import TorqueBounds, exact_bounds
+from modrob_cli.errors import NumericalError
 from modrob_cli.identify.prediction import PredictionError, prediction_errors
 from modrob_cli.identify.regression import RegressionOptions
 from modrob_cli.identify.regression_result import JointEstimate
@@ -83,11 +84,15 @@ def judge(loaded: LoadedRobot, paths: Sequence[Path], options: ValidateOptions, 
     holdout = options.holdout if friction == "held-out" else 0.0
     reading = IdentifyOptions(options.effort, options.reading, options.cutoff, holdout)
     runs = load_runs(robot, paths, reading, track)
-    if friction == "file":
-        logs = [_by_file(loaded, item) for item in runs.runs]
-    else:
-        logs = [_by_fit(robot, item, friction) for item in runs.runs]
-    return Judged(logs, friction, runs.skipped)
+    logs, skipped = [], list(runs.skipped)
+    for item in runs.runs:
+        try:
+            logs.append(_by_file(loaded, item) if friction == "file" else _by_fit(robot, item, friction))
+        except NumericalError as error:
+            skipped.append((item.path, str(error)))
+    if not logs:
+        raise NumericalError("\n".join(f"{path}: {reason}" for path, reason in skipped))
+    return Judged(logs, friction, skipped)
 
 
 def has_friction(robot: Robot) -> bool:
@@ -99,11 +104,8 @@ def has_friction(robot: Robot) -> bool:
 def _by_file(loaded: LoadedRobot, item: LogRun) -> JudgedLog:
     """The robot as its file has it, on samples that the file was not fitted to."""
     run = item.whole
-    known = (
-        [used for used in loaded.identified_from if used.sha256 == sha256(item.path)]
-        if (loaded.identified_from)
-        else []
-    )
+    digest = sha256(item.path) if loaded.identified_from else ""
+    known = [used for used in loaded.identified_from if used.sha256 == digest]
     taken = _taken(run, known)
     used = run.used & ~taken
     fitted = bool(known) and not used.any()
@@ -152,6 +154,8 @@ def _judged(
     excluded: float,
     estimates: list[JointEstimate] | None,
 ) -> JudgedLog:
+    if not used.any():
+        raise NumericalError("no samples are left to judge the model by; use a longer log or another --holdout")
     errors = prediction_errors(replace(run.signals, used=used), run.tau, bounds.nominal)
     inside = ((bounds.lower <= run.tau) & (run.tau <= bounds.upper))[used].mean(axis=0)
     return JudgedLog(item, run, bounds, used, fitted, excluded, estimates, errors, inside)

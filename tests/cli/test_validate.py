@@ -46,7 +46,13 @@ def motion() -> tuple[np.ndarray[Any, Any], ...]:
     return t, 0.5 * np.sin(phase), 0.5 * w * np.cos(phase), -0.5 * w**2 * np.sin(phase)
 
 
-def record(path: Path, scale: float = 1.0, noise: float = 0.0, names: tuple[str, str] = ("slide", "shoulder")) -> Path:
+def record(
+    path: Path,
+    scale: float = 1.0,
+    noise: float = 0.0,
+    names: tuple[str, str] = ("slide", "shoulder"),
+    samples: int = 1500,
+) -> Path:
     """A log of the robot with known friction, by Pinocchio; joints in another order than the robot's."""
     model = pin.buildModelFromXML(URDF)
     data = model.createData()
@@ -55,7 +61,7 @@ def record(path: Path, scale: float = 1.0, noise: float = 0.0, names: tuple[str,
     tau += OFFSET + COULOMB * np.sign(dq) + VISCOUS * dq + INERTIA * ddq
     tau = scale * tau + noise * np.random.default_rng(1).normal(size=tau.shape)
     rows = [
-        joint_state(50.0 + t[k], names, q[k, ::-1], dq[k, ::-1], tau[k, ::-1]) for k in range(len(t))
+        joint_state(50.0 + t[k], names, q[k, ::-1], dq[k, ::-1], tau[k, ::-1]) for k in range(samples)
     ]  # fmt: skip
     return write_mcap(path, {"/joint_states": rows})
 
@@ -171,6 +177,23 @@ def test_data_that_a_file_was_fitted_to_cannot_validate_it(robot: Path, tmp_path
     refused = modrob(robot, log, *options, "--friction", "in-sample", "-o", tmp_path / "in")
     assert refused.exit_code == 2
     assert "on the data it was fitted to" in refused.stderr
+
+
+def test_one_short_log_does_not_stop_the_others(robot: Path, tmp_path: Path) -> None:
+    """Long enough to be read, too short to be fitted to its first part and judged on the rest."""
+    short, good = record(tmp_path / "short.mcap", samples=100), record(tmp_path / "good.mcap")
+    options = ("--effort", "torque", "--max-nrmse", 0.5, "--json")
+    done = modrob(robot, short, good, *options, "-o", tmp_path / "out")
+    assert done.exit_code == 4, done.output
+    result = json.loads(done.stdout)
+    assert [Path(log["log"]).name for log in result["logs"]] == ["good.mcap"]
+    assert [Path(log["log"]).name for log in result["skipped"]] == ["short.mcap"]
+    assert result["passed"] is False
+    assert "short.mcap: " in done.stderr
+    root = ElementTree.parse(tmp_path / "out" / "two.validate.junit.xml").getroot()
+    failed = [case.get("classname") for case in root.iter("testcase") if case.find("failure") is not None]
+    assert failed == [str(short)]
+    assert modrob(robot, short, *options, "-o", tmp_path / "alone").exit_code == 5
 
 
 def test_junit_lists_each_joint(robot: Path, tmp_path: Path) -> None:
