@@ -1,24 +1,43 @@
 """Errors that reach the user, each with its own exit code.
 
 Exit codes: 0 done and the verdict is positive; 1 a bug; 2 wrong usage; 3 bad input file; 4 the tool worked
-and the answer is no; 5 numerical failure; 6 an output exists already.
+and the answer is no; 5 numerical failure; 6 an output exists already; 128 + n stopped by signal n.
 """
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import ClassVar
 
 
 class ModrobError(Exception):
     """Root of all errors that are reported without a traceback."""
 
-    exit_code: ClassVar[int] = 1
+    exit_code: int = 1
 
 
 class UsageError(ModrobError):
     """Options or arguments that do not fit together."""
 
     exit_code = 2
+
+
+class OutputError(UsageError):
+    """Outputs cannot be written: no space, no permission; another log would fare no better."""
+
+
+class StoppedError(ModrobError):
+    """Somebody stopped the run; the exit code is that of the shell, 128 and the number of the signal."""
+
+    def __init__(self, message: str, signal: int) -> None:
+        super().__init__(message)
+        self.exit_code = 128 + signal
+
+
+class FailedLogsError(ModrobError):
+    """Logs of which there is no result, each with its reason; the exit code is that of the worst."""
+
+    def __init__(self, message: str, exit_code: int) -> None:
+        super().__init__(message)
+        self.exit_code = exit_code
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from types import TracebackType
 from typing import Self, TextIO
 
 from modrob_cli.arrays import Array
-from modrob_cli.errors import UsageError
+from modrob_cli.errors import OutputError
 from modrob_cli.io.csv_writer import csv_text
 
 
@@ -15,7 +15,7 @@ class NumberCsv:
 
     Raises
     ------
-    UsageError
+    OutputError
         If it cannot be written.
     """
 
@@ -29,7 +29,7 @@ class NumberCsv:
         try:
             self._stream = self.path.open("w", encoding="utf-8", newline="")
         except OSError as error:
-            raise UsageError(f"cannot write into {self.path.parent}: {error.strerror}") from error
+            raise OutputError(f"cannot write into {self.path.parent}: {error.strerror}") from error
         self._write(csv_text(self.header, []))
         return self
 
@@ -43,7 +43,7 @@ class NumberCsv:
         try:
             self._stream.write(text)
         except OSError as error:
-            raise UsageError(f"cannot write into {self.path.parent}: {error.strerror}") from error
+            raise OutputError(f"cannot write into {self.path.parent}: {error.strerror}") from error
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -54,4 +54,4 @@ class NumberCsv:
         try:
             self._stream.close()
         except OSError as closing:
-            raise UsageError(f"cannot write into {self.path.parent}: {closing.strerror}") from closing
+            raise OutputError(f"cannot write into {self.path.parent}: {closing.strerror}") from closing

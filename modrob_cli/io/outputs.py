@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Self
 
 from modrob_cli import __version__
-from modrob_cli.errors import OutputExistsError, UsageError
+from modrob_cli.errors import OutputError, OutputExistsError, UsageError
 
 
 def sha256(path: Path) -> str:
@@ -37,6 +37,11 @@ def provenance(inputs: list[Path]) -> dict[str, object]:
     return {"modrob": __version__, "inputs": hashes}
 
 
+def read_files(folder: Path, names: list[str]) -> dict[str, bytes]:
+    """Content of some files of a folder by name, in this order."""
+    return {name: (folder / name).read_bytes() for name in names}
+
+
 class OutputFolder:
     """Collects files and puts them into a folder together when the ``with`` block ends well.
 
@@ -47,13 +52,20 @@ class OutputFolder:
     ------
     OutputExistsError
         If a file is there already and ``overwrite`` is false; before anything is written.
+    OutputError
+        If the folder cannot be made or written.
     UsageError
-        If the folder cannot be made or written, or two files get one name.
+        If two files get one name.
+
+    Parameters
+    ----------
+    temporary : folder for the temporary files, on the same disk; None for the folders that they go to
     """
 
-    def __init__(self, folder: Path, overwrite: bool = False) -> None:
+    def __init__(self, folder: Path, overwrite: bool = False, temporary: Path | None = None) -> None:
         self.folder = folder
         self.overwrite = overwrite
+        self.temporary = temporary
         self._staged: dict[Path, Path] = {}
         self._made: list[Path] = []
 
@@ -63,7 +75,7 @@ class OutputFolder:
             missing = [path for path in (self.folder, *self.folder.parents) if not path.exists()]
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise UsageError(f"cannot make the output folder {self.folder}: {error.strerror}") from error
+            raise OutputError(f"cannot make the output folder {self.folder}: {error.strerror}") from error
         self._made = missing
         return self
 
@@ -99,12 +111,19 @@ class OutputFolder:
             if not target.parent.exists():
                 target.parent.mkdir()
                 self._made.insert(0, target.parent)
-            handle, path = tempfile.mkstemp(prefix=".modrob-", suffix=target.suffix, dir=target.parent)
+            handle, path = tempfile.mkstemp(
+                prefix=".modrob-", suffix=target.suffix, dir=self.temporary or target.parent
+            )
         except OSError as error:
-            raise UsageError(f"cannot write into {self.folder}: {error.strerror}") from error
+            raise OutputError(f"cannot write into {self.folder}: {error.strerror}") from error
         os.close(handle)
         self._staged[target] = Path(path)
         return Path(path)
+
+    def hashes(self) -> dict[str, str]:
+        """Hash of each file that was staged so far, by name."""
+        named = {str(target.relative_to(self.folder)): path for target, path in self._staged.items()}
+        return {name: f"sha256:{sha256(path)}" for name, path in named.items()}
 
     def write(self, name: str, content: str | bytes) -> Path:
         """Stage a file with this content; returns its final path."""
@@ -115,17 +134,17 @@ class OutputFolder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Rename all files into place, or remove all of them; a failure to write becomes a UsageError."""
+        """Rename all files into place, or remove all of them; a failure to write becomes an OutputError."""
         if kind is None:
             try:
                 self._rename()
             except OSError as problem:
                 self._discard()
-                raise UsageError(f"cannot write into {self.folder}: {problem.strerror or problem}") from problem
+                raise OutputError(f"cannot write into {self.folder}: {problem.strerror or problem}") from problem
             return
         self._discard()
         if isinstance(error, OSError):
-            raise UsageError(f"cannot write into {self.folder}: {error.strerror or error}") from error
+            raise OutputError(f"cannot write into {self.folder}: {error.strerror or error}") from error
 
     def _rename(self) -> None:
         """Put the staged files into place, with the permissions of any new file."""

@@ -73,6 +73,7 @@ class JointLog:
     effort : shape (N, n); what it means (joint torque, motor torque, current) is for the user to say
     repeated : number of samples that were left out because their time was that of the sample before
     notes : what was left out, ignored, repaired or lost, in words
+    start : stamp of the first sample, [ns] since 1970; None if nothing tells
     """
 
     name: str
@@ -83,6 +84,7 @@ class JointLog:
     effort: Array
     repeated: int = 0
     notes: tuple[str, ...] = ()
+    start: int | None = None
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check that they fit together."""

@@ -1,0 +1,94 @@
+"""Stop a batch at random instants and go on: ``python -m benchmarks.batch_kills ROBOT LOGS... [--kills 50] OPTIONS``.
+
+Runs ``modrob validate`` undisturbed, then again into another folder, where it gets a random signal (SIGKILL half of the
+time; to its whole process group, or to the main process alone) after a random time, and goes on with ``--resume``.
+After each kill every visible file has to be one of the undisturbed run, byte by byte (a record may still lack its
+pictures); at the end the folders have to be the same.
+"""
+
+import argparse
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from benchmarks.timing import MODROB
+
+SIGNALS = (signal.SIGKILL, signal.SIGKILL, signal.SIGKILL, signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+def start(command: list[str], out: Path, extra: list[str]) -> "subprocess.Popen[bytes]":
+    """A run in a process group of its own."""
+    quiet = subprocess.DEVNULL
+    return subprocess.Popen([*command, "-o", str(out), *extra], stdout=quiet, stderr=quiet, start_new_session=True)
+
+
+def visible(folder: Path) -> dict[str, bytes]:
+    """Files under their final names."""
+    if not folder.is_dir():
+        return {}
+    return {path.name: path.read_bytes() for path in folder.iterdir() if not path.name.startswith(".modrob")}
+
+
+def wrong_files(found: dict[str, bytes], expected: dict[str, bytes]) -> list[str]:
+    """Files that are not those of the undisturbed run."""
+    wrong = []
+    for name, content in found.items():
+        if content == expected.get(name):
+            continue
+        record = json.loads(content) if name.endswith(".json") else {}
+        if record.get("provenance", {}).get("detailed") is not False:
+            wrong.append(name)
+    return wrong
+
+
+def main() -> None:
+    """Print what happened; exit code 1 if anything was lost."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("arguments", nargs="+", help="of modrob validate: ROBOT LOG...")
+    parser.add_argument("--kills", type=int, default=50)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--command", default="validate")
+    given, options = parser.parse_known_args()
+    command = [*MODROB, given.command, *given.arguments, *[option for option in options if option != "--"]]
+    rng, bad = random.Random(given.seed), []
+    with tempfile.TemporaryDirectory() as name:
+        whole, killed = Path(name, "whole"), Path(name, "killed")
+        begin = time.perf_counter()
+        code = start(command, whole, []).wait()
+        undisturbed = time.perf_counter() - begin
+        expected = visible(whole)
+        print(f"undisturbed: {undisturbed:.1f} s, exit code {code}, {len(expected)} files")
+        for k in range(given.kills):
+            process = start(command, killed, ["--resume"])
+            # Most of the time is start and the check of what is there; kills spread over all of the run.
+            time.sleep(rng.uniform(0.0, max(3.0, 3.0 * undisturbed / given.kills)))
+            chosen, group = rng.choice(SIGNALS), rng.random() < 0.5
+            (os.killpg if group else os.kill)(process.pid, chosen)
+            ended = process.wait()
+            found = visible(killed)
+            wrong = wrong_files(found, expected)
+            bad += wrong
+            print(
+                f"{k + 1:3d} {chosen.name} {'group' if group else 'alone'}: exit {ended}, {len(found)} files,"
+                f" wrong: {wrong}"
+            )
+        begin = time.perf_counter()
+        last = start(command, killed, ["--resume"]).wait()
+        left = [path.name for path in killed.iterdir() if path.name.startswith(".modrob")]
+        same = visible(killed) == expected
+        print(
+            f"resumed to the end in {time.perf_counter() - begin:.1f} s, exit code {last}; the same: {same};"
+            f" left: {left}"
+        )
+        if bad or not same or left or last != code:
+            sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()
