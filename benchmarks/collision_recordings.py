@@ -17,9 +17,11 @@ import numpy as np
 from benchmarks.timing import MODROB
 from modrob_cli.arrays import Array
 from modrob_cli.collision.observer import external_torque, momentum_terms
-from modrob_cli.workflows.collision_judge import filtered_band, learn
+from modrob_cli.workflows.collision_banding import filtered_band, learn
+from modrob_cli.workflows.collision_load import load_run
 from modrob_cli.workflows.collision_options import CollisionOptions, parse_filter
-from modrob_cli.workflows.collision_runs import CollisionRun, load_run
+from modrob_cli.workflows.collision_runs import CollisionRun
+from modrob_cli.workflows.collision_stream import stream_of
 from modrob_cli.workflows.robots import load_robot
 
 PUSH, PLACES, SHARE = 0.5, 40, 0.9
@@ -34,7 +36,7 @@ def levels(
     run: CollisionRun, options: CollisionOptions, train: CollisionRun
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """Signals of each method per unit of its thresholds, so that abs > 1 is an alarm, and these thresholds; (N, n)."""
-    learned = learn([train], options)
+    learned = learn([stream_of(train)], options)
     exact, ianea, _ = filtered_band(run, options, compare=True)
     if learned is None or ianea is None or run.tau is None:
         raise ValueError("expected a log")
@@ -59,7 +61,7 @@ def answers(
     run: CollisionRun, options: CollisionOptions, train: CollisionRun, start: int, length: int
 ) -> dict[str, Array]:
     """What a push of 1 N m does to each method's filtered signal, shape (length,): all are linear in the torque."""
-    learned = learn([train], options)
+    learned = learn([stream_of(train)], options)
     if learned is None:
         raise ValueError("expected a log")
     push = np.zeros((len(run.motion.t), 1))

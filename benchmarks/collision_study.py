@@ -30,9 +30,10 @@ from modrob_cli.simulate.controllers.interface import ControlTask
 from modrob_cli.simulate.controllers.shipped import make_controller
 from modrob_cli.simulate.recording import Recording
 from modrob_cli.simulate.truth import true_robot
-from modrob_cli.workflows.collision_judge import Learned, filtered_band, learn
+from modrob_cli.workflows.collision_banding import Learned, filtered_band, learn
 from modrob_cli.workflows.collision_options import CollisionOptions, parse_filter
 from modrob_cli.workflows.collision_runs import CollisionRun
+from modrob_cli.workflows.collision_stream import stream_of
 from modrob_cli.workflows.robots import load_robot
 
 ROBOT = Path(__file__).parents[1] / "assemblies" / "lwa4p-6-payload.yaml"
@@ -216,7 +217,7 @@ def table(clean: list[Outcome], pushed: list[Outcome], edges: Array) -> list[str
 def study(runs: int, filter_text: str) -> list[str]:
     """The whole study as lines for people."""
     robot, options = load_robot(ROBOT).robot, study_options(filter_text)
-    learned = learn([simulate_run(robot, 10_000 + k, False).run for k in range(TRAINING)], options)
+    learned = learn([stream_of(simulate_run(robot, 10_000 + k, False).run) for k in range(TRAINING)], options)
     if learned is None:
         raise ValueError("expected training runs")
     made = [simulate_run(robot, k, False) for k in range(runs)]

@@ -1,7 +1,9 @@
 """Logs shared among the workers of a Dask cluster; results come back as bytes and are written here."""
 
+import logging
 from collections import deque
 from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -41,7 +43,7 @@ def run_cluster(jobs: Sequence[LogJob], context: Context, address: str) -> Gener
     except ImportError as error:
         raise UsageError("--dask needs dask.distributed: pip install 'modrob[dask]'") from error
     there, suspects = replace(context, base=Path.cwd()), []
-    with _client(address) as client:
+    with _quiet(), _client(address) as client:
         _check_versions(client, address)
         for future, job in _futures(client, jobs, there, AHEAD * max(sum(client.nthreads().values()), 1)):
             if isinstance(future.exception(), KilledWorker):
@@ -72,6 +74,17 @@ def _futures(client: Any, jobs: Sequence[LogJob], context: Context, ahead: int) 
     for future in done:
         yield future, sent.pop(future)
         send()
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Without the messages of libraries, which tell of lost connections at length; what matters is told here."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logging.disable(before)
 
 
 def _client(address: str) -> Any:
@@ -127,9 +140,9 @@ def _collect(future: Any, job: LogJob, context: Context, address: str) -> Outcom
     try:
         outcome, files = future.result()
     except OutputError as error:
-        return Outcome(job, None, Failure(f"{job.source}: on its worker: {error}", error.exit_code))
+        return Outcome(job, None, Failure(f"{job.label}: on its worker: {error}", error.exit_code))
     except Exception as error:  # KilledWorker and whatever else the cluster has to say
-        reason = f"{job.source}: lost on the cluster, {type(error).__name__}: {error}"
+        reason = f"{job.label}: lost on the cluster, {type(error).__name__}: {error}"
         return Outcome(job, None, Failure(reason, BUG))
     with OutputFolder(context.out, overwrite=True, temporary=context.staging) as folder:
         for name, content in files.items():

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from modrob_cli.io.log_sources import source_label, source_name
 from modrob_cli.io.outputs import OutputFolder
 
 DETAILS = 10
@@ -24,6 +25,16 @@ class LogJob:
 
     name: str
     source: str
+
+    @property
+    def label(self) -> str:
+        """The source for people and records: of a URL without user and query, which may hold keys."""
+        return source_label(self.source)
+
+    @property
+    def file(self) -> str:
+        """Name of its file."""
+        return source_name(self.source)
 
 
 @dataclass(frozen=True)

@@ -93,7 +93,7 @@ def _lost(worker: _Worker, waiting: deque[LogJob]) -> Outcome:
     code = worker.process.exitcode or 0
     how = f"signal {-code}, {signal.strsignal(-code)}" if code < 0 else f"exit code {code}"
     advice = "perhaps memory ran out; fewer processes (--jobs 1) need less"
-    return Outcome(blamed, None, Failure(f"{blamed.source}: the process that read it died ({how}); {advice}", BUG))
+    return Outcome(blamed, None, Failure(f"{blamed.label}: the process that read it died ({how}); {advice}", BUG))
 
 
 def _dismiss(workers: Sequence[_Worker]) -> None:

@@ -44,7 +44,7 @@ class Context:
 
     def digest(self, job: LogJob) -> str:
         """Digest of everything but the log's content that decides its record."""
-        options = {"command": self.task.command, "source": job.source, "options": self.key.options}
+        options = {"command": self.task.command, "source": job.label, "options": self.key.options}
         return key_digest({**options, "inputs": self.key.inputs})
 
 
@@ -86,11 +86,11 @@ def attempt(job: LogJob, context: Context, known: dict[str, Any] | None) -> Outc
         raise OutputError(str(error).replace(str(context.staging), str(context.out))) from error
     except ModrobError as error:
         # Errors name the file that was read; people know it by the name that they gave.
-        failure = Failure(str(error).replace(str(path), job.source), error.exit_code)
+        failure = Failure(str(error).replace(str(path), job.label).replace(job.source, job.label), error.exit_code)
     except MemoryError:
-        failure = Failure(f"{job.source}: there is not enough memory for it", InputFileError.exit_code)
+        failure = Failure(f"{job.label}: there is not enough memory for it", InputFileError.exit_code)
     except Exception as error:  # a bug, which must not cost the results of the other logs
-        failure = Failure(f"{job.source}: {_where(error)}", BUG)
+        failure = Failure(f"{job.label}: {_where(error)}", BUG)
     return Outcome(job, record, failure, kept, time.perf_counter() - start)
 
 
@@ -106,7 +106,7 @@ def _work(job: LogJob, context: Context, path: Path, digest: str) -> dict[str, A
         record = context.task.run(job, path, folder, context.detailed)
         made = {
             "modrob": __version__,
-            "inputs": {**context.key.inputs, Path(job.source).name: digest},
+            "inputs": {**context.key.inputs, job.file: digest},
             "log": digest,
             "key": context.digest(job),
             "detailed": context.detailed,

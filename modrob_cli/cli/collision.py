@@ -2,24 +2,21 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from modrob_cli.cli.batch_options import Dask, Details, Jobs, KeepGoing, Logs, Resume, batch_options
 from modrob_cli.cli.log_options import JointMap, Publisher, StrictLog, TimeOption, Topic, log_options
 from modrob_cli.cli.options import DEFAULT_OUT, AsJson, OutDir, Overwrite, numbers
-from modrob_cli.cli.progress import track
-
-if TYPE_CHECKING:
-    from modrob_cli.workflows.collision_options import CollisionOptions
 
 _HELP = """Collision thresholds that no admissible parameter passes without contact, and how sensitive they are.
 
-ROBOT is an assembly, a robot file or a URDF. LOG is an MCAP or CSV file with positions, velocities and efforts; a
-*.yaml or *.json file is a planned motion, for thresholds and sensitivity alone. For every sample the band of torques
-without contact is computed over all admissible parameters, the stated noise and the acceleration's tolerance; both
-are filtered so that inclusion holds. Writes an HTML report, a table of events, constant thresholds (YAML), and for
-each log JSON, CSV, picture and MCAP (measured, lower, upper).
+ROBOT is an assembly, a robot file or a URDF. LOG is an MCAP or CSV file with positions, velocities and efforts, or many
+of them; a *.yaml or *.json file is a planned motion, for thresholds and sensitivity alone. For every sample the band of
+torques without contact is computed over all admissible parameters, the stated noise and the acceleration's tolerance;
+both are filtered so that inclusion holds. Writes an HTML report, a table of events, constant thresholds (YAML), and for
+each log JSON, CSV and MCAP (measured, lower, upper); pictures and pages of the worst logs.
 """
 
 _EPILOG = (
@@ -29,7 +26,6 @@ _EPILOG = (
 _KINDS = ("torque", "current", "motor-torque", "net-torque")
 _SOURCES = ("desired", "measured", "smoothed")
 _EACH = "one number, or one for each joint separated by commas"
-_SHOWN = 12
 
 
 def register(app: typer.Typer) -> None:
@@ -61,7 +57,7 @@ def _option(help_text: str, metavar: str) -> Any:
 
 def _collision(
     robot: Annotated[Path, typer.Argument(metavar="ROBOT", help="Assembly, robot file or URDF.")],
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Logs, or planned motions (*.yaml, *.json).")],
+    logs: Logs,
     effort: Annotated[
         str | None,
         typer.Option(
@@ -137,17 +133,28 @@ def _collision(
     time: TimeOption = "header",
     strict: StrictLog = False,
     publisher: Publisher = None,
+    jobs: Jobs = None,
+    resume: Resume = False,
+    keep_going: KeepGoing = True,
+    dask: Dask = None,
+    details: Details = None,
     out: OutDir = DEFAULT_OUT,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
+    from modrob_cli.cli.batch_progress import FEW, batch_progress
+    from modrob_cli.cli.collision_report import end, measure, say_files, say_log
     from modrob_cli.cli.console import print_json
-    from modrob_cli.errors import NegativeAnswerError, UsageError
+    from modrob_cli.errors import UsageError
+    from modrob_cli.io.log_sources import find_logs
     from modrob_cli.workflows.collision import collision
     from modrob_cli.workflows.collision_options import CollisionOptions, parse_filter
     from modrob_cli.workflows.collision_runs import PLANNED
 
-    if effort is None and any(path.suffix.lower() not in PLANNED for path in [*logs, *(train or [])]):
+    sources = find_logs(logs)
+    if effort is None and any(
+        Path(source).suffix.lower() not in PLANNED for source in [*sources, *map(str, train or [])]
+    ):
         raise UsageError(f"--effort is missing: say what the logs call effort ({', '.join(_KINDS)})")
     kind: Any = effort or "torque"
     source: Any = acceleration
@@ -178,91 +185,14 @@ def _collision(
         cutoff=cutoff,
         compare=compare,
     )
-    result = collision(robot, logs, options, out, overwrite, track)
-    say_result(result, options)
+    batch = batch_options(jobs, resume, keep_going, dask, details, overwrite)
+    with batch_progress("collision", len(sources), measure) as listener:
+        result = collision(robot, sources, options, out, overwrite, batch, listener)
+    if len(sources) <= FEW:
+        for log in result["logs"]:
+            say_log(log, options)
+    listener.say_summary()
+    say_files(result)
     if as_json:
         print_json(result)
-    if fail_on_collision and result["collision"]:
-        raise NegativeAnswerError("\n".join(_against(result)))
-
-
-def _against(result: dict[str, Any]) -> list[str]:
-    """What was found, log by log."""
-    lines = []
-    for log in result["logs"]:
-        for event in log["events"]:
-            what = f"{event['joint']} {event['side']}, {event['peak']:.3g} {event['unit']} beyond its band"
-            lines.append(f"collision: {log['log']}: {event['start']:.4g} .. {event['end']:.4g} s: {what}")
-    return lines[:_SHOWN] + ([f"and {len(lines) - _SHOWN} more"] if len(lines) > _SHOWN else [])
-
-
-def say_result(result: dict[str, Any], options: "CollisionOptions") -> None:
-    """Print events, methods side by side and sensitivity of each log."""
-    from modrob_cli.cli.console import say
-
-    for log in result["logs"]:
-        say(f"\n{log['log']}: {log['samples']} samples, {log['duration']:.5g} s, filter {options.filter}")
-        say(f"  acceleration: {log['acceleration']}")
-        for note in log["notes"]:
-            say(f"  note: {note}")
-        _say_events(log)
-        _say_sensitivity(log)
-    say("")
-    files = list(result["files"].values())
-    for path in files[:7]:
-        say(f"wrote {path}")
-    if len(files) > 7:
-        say(f"and {len(files) - 7} more files beside them")
-
-
-def _say_events(log: dict[str, Any]) -> None:
-    from modrob_cli.cli.console import say, table
-
-    for event in log["events"][:_SHOWN]:
-        peak = f"{event['peak']:.3g} {event['unit']} beyond the band"
-        say(f"  event {event['start']:.4f} .. {event['end']:.4f} s: {event['joint']}, {event['side']} side, {peak}")
-    if len(log["events"]) > _SHOWN:
-        say(f"  and {len(log['events']) - _SHOWN} more events")
-    if not log["planned"] and not log["events"]:
-        say("  no event: the measured torque never left its band")
-    for contact in log["contacts"] or ():
-        delays = ", ".join(f"{name} {_delay(value)}" for name, value in contact["delays"].items())
-        say(f"  contact {contact['name']} {contact['start']:.4g} .. {contact['end']:.4g} s: {delays}")
-    if log["methods"]:
-        rows = [
-            (one["method"], one["events"], _dash(one["false_alarms"]), f"{one['detected']} of {one['contacts']}")
-            for one in log["methods"]
-        ]
-        say(table(("method", "events", "false alarms", "contacts found"), rows))
-
-
-def _delay(value: float | None) -> str:
-    return "missed" if value is None else f"after {1e3 * value:.0f} ms"
-
-
-def _dash(value: int | None) -> str | int:
-    return "-" if value is None else value
-
-
-def _say_sensitivity(log: dict[str, Any]) -> None:
-    from modrob_cli.cli.console import say, table
-
-    say("  certain to be found: external torque of each joint, least, median and worst over the motion")
-    rows = [
-        (
-            joint["joint"],
-            *(float(f"{joint[key]:.3g}") for key in ("least", "median", "min_detectable")),
-            joint["unit"],
-            f"{joint['shares'][0]['parameter']} {joint['shares'][0]['share']:.0%}" if joint["shares"] else "-",
-        )
-        for joint in log["sensitivity"]
-    ]
-    say(table(("joint", "least", "median", "worst", "unit", "costs most"), rows))
-    for point in log["contact_forces"]:
-        say(f"  contact force at {point['point']} [N], median over the motion: {_forces(point)}")
-
-
-def _forces(point: dict[str, Any]) -> str:
-    names = {"x": "x", "y": "y", "z": "z", "best_direction": "best", "worst_direction": "worst"}
-    values = {label: point[key]["median"] for key, label in names.items()}
-    return ", ".join(f"{label} {'never' if value is None else f'{value:.3g}'}" for label, value in values.items())
+    end(result, fail_on_collision)

@@ -1,15 +1,21 @@
 """What people see: text on stderr, results as JSON on stdout."""
 
 import json
+import sys
 from collections.abc import Sequence
 from typing import Any
 
 import typer
 
+from modrob_cli.cli.quiet import silence
+
 
 def say(text: str = "") -> None:
-    """Print a line for people, on stderr."""
-    typer.echo(text, err=True)
+    """Print a line for people, on stderr; nothing if nobody can read it any more."""
+    try:
+        typer.echo(text, err=True)
+    except OSError:
+        silence(sys.stderr)
 
 
 def print_json(result: Any) -> None:

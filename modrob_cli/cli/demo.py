@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from modrob_cli.cli import collision, identify_report, scale, simulate, validate
+from modrob_cli.cli import collision_report, identify_report, scale, simulate, validate_report
 from modrob_cli.cli.assemble import show_robot, summary_table
 from modrob_cli.cli.bounds import say_result
 from modrob_cli.cli.check import summary_line
@@ -47,18 +47,19 @@ def _report(result: "DemoResult", main: str, uncertain: str) -> None:
     simulate.say_result(result.simulated)
     say("\nThe log against the model without the payload: a misfit beyond the noise shows that something is missing.\n")
     for log in result.validated["logs"]:
-        validate.say_log(log)
+        validate_report.say_log(log)
     say("\nAnother arm, whose true parameters differ from its file by up to 5 %: identified from one run,")
     say("validated with another motion:\n")
     identify_report.say_result(result.identified)
     for log in result.held_out["logs"]:
-        validate.say_log(log)
+        validate_report.say_log(log)
     say(f"Verdict: {'passed' if result.held_out['passed'] else 'failed'} (NRMSE of every joint at most 0.3)")
     say("\nHow fast the motion of the scaling paper may be run, for every last link of 1.5 to 3 kg:")
     scale.say_result(result.scaled)
     say("\nAn arm of which friction, masses and inertias are known to intervals only: a run without contact, and one")
     say("with a hit at 2 s and a push at 15 s:")
-    collision.say_result(result.collision, workflow.collision_options())
+    for log in result.collision["logs"]:
+        collision_report.say_log(log, workflow.collision_options())
     say(f"\nEverything is in {result.folder}/; {result.folder}/README.md says what each file is.")
     say(f"Look at {result.folder}/pose/{main}.png, the pictures in bounds/ and simulated/, and *.html first.")
 

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from modrob_cli.cli.batch_options import Dask, Jobs, KeepGoing, Logs, Resume, batch_options
 from modrob_cli.cli.log_options import Effort, JointMap, Publisher, StrictLog, TimeOption, Topic, log_options, positive
 from modrob_cli.cli.options import DEFAULT_OUT, AsJson, OutDir, Overwrite, numbers
-from modrob_cli.cli.progress import track
 
 if TYPE_CHECKING:
     from modrob_cli.workflows.bounded_options import BoundedOptions
@@ -15,10 +15,11 @@ if TYPE_CHECKING:
 _HELP = """Identify friction, rotor inertia and offset of each joint from logs, and say how sure that is.
 
 ROBOT is a URDF, a robot/1 or an assembly/1 file; its nominal rigid bodies are taken as they are. LOG is an MCAP or CSV
-file without contacts; several logs are fitted together and each alone. The last part of each log is held out: the
-fit does not see it and is judged on it. Writes NAME.identified.robot.yaml (the estimates with their confidence
-intervals, for every other command), NAME.identify.json, .csv and pictures. With --bounds also the smallest intervals
-that hold every sample; with --rigid-body also base parameters, and which link's data are wrong.
+file without contacts; several logs are fitted each alone, then all together. The last part of each log is held out:
+the fit does not see it and is judged on it. Writes NAME.identified.robot.yaml (the estimates with their confidence
+intervals, for every other command), NAME.identify.json, .csv, a report (does friction drift?) and pictures. With
+--bounds also the smallest intervals that hold every sample; with --rigid-body also base parameters, and which link's
+data are wrong.
 """
 
 _EPILOG = "Example: modrob identify robot.urdf run.mcap --effort torque -o out/identify"
@@ -48,7 +49,7 @@ def register(app: typer.Typer) -> None:
 
 def _identify(
     robot: Annotated[Path, typer.Argument(metavar="ROBOT", help="URDF, robot/1 or assembly/1 file.")],
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP or CSV files.")],
+    logs: Logs,
     effort: Effort,
     topic: Topic = None,
     joint_map: JointMap = None,
@@ -93,13 +94,18 @@ def _identify(
     rigid_body: Annotated[
         bool, typer.Option("--rigid-body", help="Also estimate base parameters and name links whose data are wrong.")
     ] = False,
+    jobs: Jobs = None,
+    resume: Resume = False,
+    keep_going: KeepGoing = True,
+    dask: Dask = None,
     out: OutDir = DEFAULT_OUT,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
     from modrob_cli.cli.console import print_json
-    from modrob_cli.cli.identify_report import say_result
-    from modrob_cli.errors import NegativeAnswerError
+    from modrob_cli.cli.identify_progress import identify_progress
+    from modrob_cli.cli.identify_report import end, say_result
+    from modrob_cli.io.log_sources import find_logs
     from modrob_cli.workflows.identify import identify
     from modrob_cli.workflows.identify_options import IdentifyOptions, regression_options
 
@@ -115,12 +121,16 @@ def _identify(
         bounds=_bounded(bounds, effort_noise, outliers, velocity_band, spread, ddq_tolerance, filtered_torque),
         rigid_body=rigid_body,
     )
-    result = identify(robot, logs, options, out, overwrite, track)
+    batch = batch_options(jobs, resume, keep_going, dask, None, overwrite)
+    sources = find_logs(logs)
+    with identify_progress(len(sources)) as progress:
+        result = identify(robot, sources, options, out, overwrite, batch, progress.listener, progress.stage)
+    if per_log:
+        progress.listener.say_summary()
     say_result(result)
     if as_json:
         print_json(result)
-    if result["passed"] is False:
-        raise NegativeAnswerError(f"the NRMSE of at least one joint is above the {max_nrmse:g} of --max-nrmse")
+    end(result)
 
 
 def _bounded(

@@ -4,11 +4,13 @@ from typing import Any
 
 from modrob_cli.cli.bounded_report import say_bounds
 from modrob_cli.cli.console import say, table
+from modrob_cli.errors import FailedLogsError, NegativeAnswerError
 
 _MAIN = (("viscous", "viscous"), ("coulomb", "Coulomb"), ("reflected_inertia", "rotor"), ("offset", "offset"))
 _DIRECTIONS = ("coulomb_forward", "coulomb_backward", "viscous_forward", "viscous_backward")
 _MORE = (*_DIRECTIONS, "load", "stribeck", "stribeck_velocity", "transition_width", "drive_gain")
 _MOST_LOGS = 12
+_MOST_REASONS = 8
 
 
 def say_result(result: dict[str, Any]) -> None:
@@ -17,7 +19,7 @@ def say_result(result: dict[str, Any]) -> None:
     for reason in result["reasons"]:
         say(f"  - {reason}")
     say(f"  {result['scope']}")
-    say(f"  {result['samples']} samples fitted, {result['samples_held_out']} held out, {len(result['logs'])} log(s)")
+    say(f"  {result['samples']} samples fitted, {result['samples_held_out']} held out, {_counts(result)}")
     signals = result["signals"]
     say(f"  low-pass {signals['cutoff']:.4g} Hz: {signals['rule']}\n")
     _say_parameters(result)
@@ -28,8 +30,45 @@ def say_result(result: dict[str, Any]) -> None:
         say_bounds(result["bounds"])
     _say_rigid_body(result)
     say("")
-    for path in result["files"].values():
-        say(f"wrote {path}")
+    _say_files(result)
+
+
+def _say_files(result: dict[str, Any]) -> None:
+    """Paths of what was written; those of single logs are counted only."""
+    records = {f"{log['name']}.identify.json" for log in result["logs"]}
+    for kind, path in result["files"].items():
+        if kind not in records:
+            say(f"wrote {path}")
+    if records & set(result["files"]):
+        say(f"wrote the fit of each log: LOG.identify.json, {len(records)} files")
+
+
+def _counts(result: dict[str, Any]) -> str:
+    left_out = f", {len(result['skipped'])} left out" if result["skipped"] else ""
+    return f"{len(result['logs'])} log(s){left_out}"
+
+
+def end(result: dict[str, Any]) -> None:
+    """Exit code and message of a run that has results.
+
+    Raises
+    ------
+    FailedLogsError
+        If logs are left out, or ``--max-nrmse`` is exceeded.
+    """
+    from modrob_cli.workflows.batch_result import worst_code
+
+    code, lines = 0, []
+    if result["passed"] is False:
+        code = NegativeAnswerError.exit_code
+        limit = result["options"]["max_nrmse"]
+        lines.append(f"the NRMSE of at least one joint is above the {limit:g} of --max-nrmse")
+    lines += [f"{item['log']}: {item['reason']}" for item in result["skipped"][:_MOST_REASONS]]
+    left = len(result["skipped"]) - _MOST_REASONS
+    lines += [f"and {left} more logs that are left out"] if left > 0 else []
+    code = worst_code(result["skipped"], code)
+    if code:
+        raise FailedLogsError("\n".join(lines), code)
 
 
 def _verdict(result: dict[str, Any]) -> str:
@@ -96,23 +135,19 @@ def _say_errors(result: dict[str, Any]) -> None:
 
 
 def _say_logs(result: dict[str, Any]) -> None:
+    from modrob_cli.workflows.identify_result import worst_first
+
     logs = result["logs"]
-    for item in result["skipped"]:
-        say(f"  skipped: {item['log']}: {item['reason']}")
     if len(logs) < 2:
         return
     names = [joint["name"] for joint in result["joints"]]
     rows = []
-    for log in sorted(logs, key=_worst, reverse=True)[:_MOST_LOGS]:
+    for log in worst_first(logs)[:_MOST_LOGS]:
         ratios = [_figure(joint["nrmse"]) for joint in log["prediction"] or []]
         rows.append((log["log"], f"{log['duration']:.4g}", *(ratios or ["-"] * len(names))))
     more = f", the worst {_MOST_LOGS} of {len(logs)}" if len(logs) > _MOST_LOGS else ""
     say(f"  NRMSE of the pooled fit log by log{more} (the fit of each alone is in the JSON and CSV files)\n")
     say(table(("log", "s", *names), rows) + "\n")
-
-
-def _worst(log: dict[str, Any]) -> float:
-    return max((joint["nrmse"] or 0.0 for joint in log["prediction"] or []), default=0.0)
 
 
 def _say_notes(result: dict[str, Any]) -> None:

@@ -5,6 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
+from modrob_cli.cli.batch_options import Logs
 from modrob_cli.cli.log_options import JointMap, Publisher, StrictLog, TimeOption, Topic, log_options
 from modrob_cli.cli.options import AsJson, Overwrite
 from modrob_cli.cli.progress import track
@@ -38,7 +39,7 @@ def register(app: typer.Typer) -> None:
 
 
 def _info(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP or CSV files.")],
+    logs: Logs,
     topic: Topic = None,
     joint_map: JointMap = None,
     time: TimeOption = "header",
@@ -47,13 +48,17 @@ def _info(
     as_json: AsJson = False,
 ) -> None:
     from modrob_cli.cli.console import print_json
+    from modrob_cli.errors import FailedLogsError, InputFileError
+    from modrob_cli.io.log_sources import find_logs
     from modrob_cli.workflows.log_info import log_info
 
-    result = log_info(logs, log_options(topic, joint_map, time, strict, publisher), track)
+    result = log_info(find_logs(logs), log_options(topic, joint_map, time, strict, publisher), track)
     for log in result["logs"]:
         _say_log(log)
     if as_json:
         print_json(result)
+    if result["skipped"]:
+        raise FailedLogsError("\n".join(entry["reason"] for entry in result["skipped"]), InputFileError.exit_code)
 
 
 def _convert(

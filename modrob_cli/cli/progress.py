@@ -2,7 +2,11 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
+from typing import TypeVar
+
+from modrob_cli.cli.quiet import QuietStream, stderr_console
+
+T = TypeVar("T")
 
 
 @contextmanager
@@ -10,24 +14,22 @@ def progress_bar(text: str) -> Iterator[Callable[[str, float], None]]:
     """Show a bar if there is somebody to see it; what is yielded takes what is done and the part that is done."""
     import sys
 
-    if not sys.stderr.isatty():
+    if not QuietStream(sys.stderr).isatty():
         yield lambda what, fraction: None
         return
-    from rich.console import Console
     from rich.progress import Progress
 
-    with Progress(console=Console(stderr=True), transient=True) as progress:
+    with Progress(console=stderr_console(), transient=True) as progress:
         task = progress.add_task(text, total=1.0)
         yield lambda what, fraction: progress.update(task, description=what or text, completed=fraction)
 
 
-def track(paths: Sequence[Path], text: str = "Reading") -> Iterable[Path]:
+def track(paths: Sequence[T], text: str = "Reading") -> Iterable[T]:
     """Go through files with a bar, if there is something to wait for and somebody to see it."""
     import sys
 
-    if len(paths) < 2 or not sys.stderr.isatty():
+    if len(paths) < 2 or not QuietStream(sys.stderr).isatty():
         return paths
-    from rich.console import Console
     from rich.progress import track as rich_track
 
-    return rich_track(paths, text, console=Console(stderr=True), transient=True)
+    return rich_track(paths, text, console=stderr_console(), transient=True)

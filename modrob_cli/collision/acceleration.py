@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modrob_cli.arrays import Array
+from modrob_cli.arrays import Array, Indices
 from modrob_cli.errors import NumericalError
 
 
@@ -37,12 +37,29 @@ class VelocityKnowledge:
     still: Array
 
 
-def measured_acceleration(t: Array, dq: Array, known: VelocityKnowledge) -> tuple[Array, Array, int]:
+def estimation_windows(known: VelocityKnowledge, step: float) -> Indices:
+    """Samples over which each joint's acceleration is estimated, shape (n,), at this step [s].
+
+    Raises
+    ------
+    NumericalError
+        If a jerk is not positive.
+    """
+    if not np.all(np.isfinite(known.jerk) & (known.jerk > 0.0)):
+        raise NumericalError("the largest jerk of every joint has to be positive")
+    return np.maximum(np.round(2.0 * np.sqrt(known.noise / known.jerk) / step), 1.0).astype(np.intp)
+
+
+def measured_acceleration(
+    t: Array, dq: Array, known: VelocityKnowledge, step: float | None = None
+) -> tuple[Array, Array, int]:
     """Acceleration from velocities and the half-width of its error.
 
     Parameters
     ----------
     t : increasing times, shape (N,), [s];  dq : measured velocities, shape (N, n)
+    step : of a longer log that this is a piece of, [s]; None: the median one. Of a piece, samples before ``first``
+        lack their past, and the last one lacks the step behind it.
 
     Returns
     -------
@@ -54,10 +71,7 @@ def measured_acceleration(t: Array, dq: Array, known: VelocityKnowledge) -> tupl
     NumericalError
         If a jerk is not positive, or the log is shorter than a window.
     """
-    if not np.all(np.isfinite(known.jerk) & (known.jerk > 0.0)):
-        raise NumericalError("the largest jerk of every joint has to be positive")
-    step = float(np.median(np.diff(t)))
-    windows = np.maximum(np.round(2.0 * np.sqrt(known.noise / known.jerk) / step), 1.0).astype(int)
+    windows = estimation_windows(known, float(np.median(np.diff(t))) if step is None else step)
     longest = int(windows.max())
     if longest >= len(t):
         raise NumericalError("the log is shorter than the window over which accelerations are estimated")

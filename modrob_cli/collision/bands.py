@@ -45,6 +45,11 @@ _CELLS = 4096
 """Cells worked on at once."""
 
 
+def cell_size(rate: float) -> int:
+    """Samples in a cell at a sampling rate [Hz]."""
+    return max(1, round(CELL * rate))
+
+
 @dataclass(frozen=True)
 class UncertainMotion:
     """A motion that is known up to half-widths; N samples, n joints.
@@ -55,6 +60,8 @@ class UncertainMotion:
     q, dq, ddq : shape (N, n), [rad] or [m] and derivatives
     q_rad, dq_rad : half-widths >= 0, shape (n,)
     ddq_rad : half-widths >= 0, shape (n,), or (N, n) where they change
+    step : median step of the longer motion that this is a piece of, [s]; None: it is a whole one
+    least : least ``ddq_rad`` of that motion, shape (n,); None: it is a whole one
     """
 
     t: Array
@@ -64,6 +71,8 @@ class UncertainMotion:
     q_rad: Array
     dq_rad: Array
     ddq_rad: Array
+    step: float | None = None
+    least: Array | None = None
 
     def __post_init__(self) -> None:
         """Check that the arrays fit together.
@@ -85,14 +94,28 @@ class UncertainMotion:
             raise NumericalError("half-widths of a motion must be finite and not negative")
 
     @property
+    def median_step(self) -> float:
+        """Median step, [s]; 1 for a single sample."""
+        if self.step is not None:
+            return self.step
+        return float(np.median(np.diff(self.t))) if len(self.t) > 1 else 1.0
+
+    @property
     def rate(self) -> float:
-        """Samples per second, by the median step; 1 for a single sample."""
-        return 1.0 / float(np.median(np.diff(self.t))) if len(self.t) > 1 else 1.0
+        """Samples per second, by the median step."""
+        return 1.0 / self.median_step
 
     @property
     def least_ddq_rad(self) -> Array:
         """Half-width of ddq that no sample is below, shape (n,)."""
+        if self.least is not None:
+            return self.least
         return np.asarray(self.ddq_rad if self.ddq_rad.ndim == 1 else self.ddq_rad.min(axis=0))
+
+    @property
+    def cell(self) -> int:
+        """Samples in a cell over which slopes are enclosed."""
+        return cell_size(self.rate)
 
     @property
     def is_exact(self) -> bool:
@@ -172,10 +195,12 @@ def _without_drives(robot: Robot) -> Robot:
 
 
 def state_widths(robot: Robot, motion: UncertainMotion) -> StateWidths:
-    """How far the boxes of states move the ends of the rigid bodies' torque; rounded up."""
+    """How far the boxes of states move the ends of the rigid bodies' torque; rounded up.
+
+    Pieces of a motion give what the whole gives if they begin at a multiple of its :attr:`UncertainMotion.cell`.
+    """
     bare = _without_drives(robot)
-    size = max(1, round(CELL * motion.rate))
-    starts = np.arange(0, len(motion.t), size)
+    starts = np.arange(0, len(motion.t), motion.cell)
     widths = np.zeros((3, 2, len(starts), bare.dof))
     for first in range(0, 0 if motion.is_exact else len(starts), _CELLS):
         some = starts[first : first + _CELLS]

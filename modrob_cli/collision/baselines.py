@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from modrob_cli.arrays import Array
-from modrob_cli.collision.observer import MomentumTerms, external_torque
+from modrob_cli.collision.observer import MomentumTerms, ObserverRun
 
 GAINS = (2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 """Gains of the observer that are tried [1/s]."""
@@ -36,14 +36,39 @@ class TunedObserver:
     thresholds: Array
 
 
-def tune_observer(runs: list[MomentumTerms], margin: float) -> TunedObserver:
-    """Choose the gain on runs without contact.
+class ObserverTuner:
+    """Chooses the gain on runs without contact, which come piece by piece.
 
     A high gain answers fast and lets the noise through. Of :data:`GAINS` the one is taken that finds the smallest
     step of torque within :data:`ANSWER`, the mean over the joints relative to the smallest of each.
     """
-    found = [constant_thresholds([external_torque(run, gain) for run in runs], margin) for gain in GAINS]
-    steps = np.stack([limit / (1.0 - np.exp(-gain * ANSWER)) for gain, limit in zip(GAINS, found, strict=True)])
-    least = np.where(steps.min(axis=0) > 0.0, steps.min(axis=0), 1.0)
-    best = int((steps / least).mean(axis=1).argmin())
-    return TunedObserver(GAINS[best], found[best])
+
+    def __init__(self) -> None:
+        self._most: list[Array] = [np.zeros(1) for _ in GAINS]
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin a new run."""
+        self._runs = [ObserverRun(gain) for gain in GAINS]
+
+    def add(self, terms: MomentumTerms) -> None:
+        """Take the next samples of the run."""
+        for k, run in enumerate(self._runs):
+            self._most[k] = np.maximum(self._most[k], np.abs(run.add(terms)).max(axis=0))
+
+    def tuned(self, margin: float) -> TunedObserver:
+        """Gain and thresholds by all runs up to now; ``margin`` as for :func:`constant_thresholds`."""
+        found = [(1.0 + margin) * most for most in self._most]
+        steps = np.stack([limit / (1.0 - np.exp(-gain * ANSWER)) for gain, limit in zip(GAINS, found, strict=True)])
+        least = np.where(steps.min(axis=0) > 0.0, steps.min(axis=0), 1.0)
+        best = int((steps / least).mean(axis=1).argmin())
+        return TunedObserver(GAINS[best], found[best])
+
+
+def tune_observer(runs: list[MomentumTerms], margin: float) -> TunedObserver:
+    """Choose the gain on whole runs; see :class:`ObserverTuner`."""
+    tuner = ObserverTuner()
+    for run in runs:
+        tuner.begin()
+        tuner.add(run)
+    return tuner.tuned(margin)

@@ -1,7 +1,7 @@
 """Where a measured torque leaves its band: events, and what they are worth against known contacts."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -101,6 +101,57 @@ class Score:
         return sum(delay is not None for delay in self.delays)
 
 
+class EventFinder:
+    """Finds the events of one run, whose samples come piece by piece."""
+
+    def __init__(self, rules: Rules) -> None:
+        self._rules = rules
+        self._found: dict[tuple[int, Side], list[Event]] = {}
+        self._last: dict[tuple[int, Side], int] = {}
+        self._count = 0
+
+    def add(self, t: Array, excess: Array) -> None:
+        """Take the next samples.
+
+        Parameters
+        ----------
+        t : shape (N,);  excess : signed distance from the band, 0 inside, shape (N, n)
+        """
+        sides: tuple[tuple[Side, float], ...] = (("lower", -1.0), ("upper", 1.0))
+        for joint in np.flatnonzero((excess != 0.0).any(axis=0)).tolist():
+            for side, sign in sides:
+                beyond = sign * excess[:, joint]
+                for first, last in _stretches(t, beyond > 0.0, self._rules.merge):
+                    peak = first + int(beyond[first : last + 1].argmax())
+                    times = float(t[first]), float(t[last])
+                    self._put(Event(*times, joint, side, float(beyond[peak]), float(t[peak])), first, last)
+        self._count += len(t)
+
+    def _put(self, event: Event, first: int, last: int) -> None:
+        """Join an event with the one before it, if they are one, or begin a new one."""
+        key = event.joint, event.side
+        before = self._found.setdefault(key, [])
+        near = before and (
+            self._count + first - self._last[key] <= 1 or event.start - before[-1].end <= self._rules.merge
+        )
+        if near:
+            peak = event if event.peak > before[-1].peak else before[-1]
+            event = replace(before[-1], end=event.end, peak=peak.peak, peak_time=peak.peak_time)
+        if before and (near or not self._counts(before[-1])):
+            before.pop()
+        before.append(event)
+        self._last[key] = self._count + last
+
+    def _counts(self, event: Event) -> bool:
+        return event.end - event.start >= self._rules.shortest
+
+    @property
+    def events(self) -> list[Event]:
+        """All events up to now in the order of their starts."""
+        found = [event for events in self._found.values() for event in events if self._counts(event)]
+        return sorted(found, key=lambda event: (event.start, event.joint, event.side))
+
+
 def find_events(t: Array, excess: Array, rules: Rules) -> list[Event]:
     """Events in the order of their starts.
 
@@ -108,17 +159,9 @@ def find_events(t: Array, excess: Array, rules: Rules) -> list[Event]:
     ----------
     t : shape (N,);  excess : signed distance from the band, 0 inside, shape (N, n)
     """
-    events = []
-    for joint in range(excess.shape[1]):
-        for side, beyond in (("lower", -excess[:, joint]), ("upper", excess[:, joint])):
-            for first, last in _stretches(t, beyond > 0.0, rules.merge):
-                if t[last] - t[first] < rules.shortest:
-                    continue
-                peak = first + int(beyond[first : last + 1].argmax())
-                ends = (float(t[first]), float(t[last]))
-                kind: Side = "lower" if side == "lower" else "upper"
-                events.append(Event(*ends, joint, kind, float(beyond[peak]), float(t[peak])))
-    return sorted(events, key=lambda event: (event.start, event.joint))
+    finder = EventFinder(rules)
+    finder.add(t, excess)
+    return finder.events
 
 
 def _stretches(t: Array, outside: Mask, merge: float) -> list[tuple[int, int]]:
@@ -132,22 +175,41 @@ def _stretches(t: Array, outside: Mask, merge: float) -> list[tuple[int, int]]:
     return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
 
 
-def score(t: Array, excess: Array, events: Sequence[Event], contacts: Sequence[Contact], settle: float) -> Score:
-    """Compare events with known contacts.
+class Scorer:
+    """Compares with known contacts, samples coming piece by piece.
 
     Parameters
     ----------
     settle : time behind a contact in which the filter and the controller still answer to it, [s]
     """
-    free = np.ones(len(t), dtype=bool)
-    for contact in contacts:
-        free &= (t < contact.start) | (t >= contact.end + settle)
-    alarms = sum(
-        all(not contact.start <= event.start < contact.end + settle for contact in contacts) for event in events
-    )
-    outside = (excess[free] != 0.0).any(axis=1)
-    delays = tuple(_delay(events, contact, settle) for contact in contacts)
-    return Score(alarms, float(outside.mean()) if len(outside) else 0.0, delays)
+
+    def __init__(self, contacts: Sequence[Contact], settle: float) -> None:
+        self._contacts, self._settle = contacts, settle
+        self._free = self._outside = 0
+
+    def add(self, t: Array, excess: Array) -> None:
+        """Take the next samples, as :meth:`EventFinder.add`."""
+        free = np.ones(len(t), dtype=bool)
+        for contact in self._contacts:
+            free &= (t < contact.start) | (t >= contact.end + self._settle)
+        self._free += int(np.count_nonzero(free))
+        self._outside += int(np.count_nonzero((excess[free] != 0.0).any(axis=1)))
+
+    def score(self, events: Sequence[Event]) -> Score:
+        """What these events are worth."""
+        alarms = sum(
+            all(not contact.start <= event.start < contact.end + self._settle for contact in self._contacts)
+            for event in events
+        )
+        delays = tuple(_delay(events, contact, self._settle) for contact in self._contacts)
+        return Score(alarms, self._outside / self._free if self._free else 0.0, delays)
+
+
+def score(t: Array, excess: Array, events: Sequence[Event], contacts: Sequence[Contact], settle: float) -> Score:
+    """Compare events with known contacts; see :class:`Scorer`."""
+    scorer = Scorer(contacts, settle)
+    scorer.add(t, excess)
+    return scorer.score(events)
 
 
 def _delay(events: Sequence[Event], contact: Contact, settle: float) -> float | None:

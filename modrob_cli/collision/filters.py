@@ -106,12 +106,7 @@ class RunningFilter:
 
     def apply(self, x: Array) -> Array:
         """Filter signals along the first axis, shape (T, ...)."""
-        if not len(self.sections) or not len(x):
-            return x
-        from scipy.signal import sosfilt, sosfilt_zi
-
-        start = sosfilt_zi(self.sections).reshape(len(self.sections), 2, *[1] * (x.ndim - 1))
-        return np.asarray(sosfilt(self.sections, x, axis=0, zi=start * x[0])[0])
+        return FilterRun(self).apply(x)
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, Array]:
         """Bounds (T, n) of every filtered signal that lies between lower and upper (T, n).
@@ -121,22 +116,61 @@ class RunningFilter:
         ShapeError
             If the shapes differ.
         """
+        return BoundsRun(self).bounds(lower, upper)
+
+
+class FilterRun:
+    """A filter at work on one signal, which comes piece by piece."""
+
+    def __init__(self, running: RunningFilter) -> None:
+        self._running = running
+        self._state: Array | None = None
+
+    def apply(self, x: Array) -> Array:
+        """Filter the next samples along the first axis, shape (T, ...)."""
+        sections = self._running.sections
+        if not len(sections) or not len(x):
+            return x
+        from scipy.signal import sosfilt, sosfilt_zi
+
+        if self._state is None:
+            self._state = sosfilt_zi(sections).reshape(len(sections), 2, *[1] * (x.ndim - 1)) * x[0]
+        filtered, self._state = sosfilt(sections, x, axis=0, zi=self._state)
+        return np.asarray(filtered)
+
+
+class BoundsRun:
+    """A filter at work on bounds that come piece by piece."""
+
+    def __init__(self, running: RunningFilter) -> None:
+        self._running = running
+        self._middle = FilterRun(running)
+        self._held: Array | None = None  # half-widths that the filter still remembers
+        self._most = self._widest = np.zeros(1)
+
+    def bounds(self, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """Bounds of the next samples, as :meth:`RunningFilter.bounds`."""
         if lower.shape != upper.shape or lower.ndim != 2:
             raise ShapeError(f"bounds of shapes {lower.shape} and {upper.shape}, expected (T, n) for both")
-        if not len(self.sections) or not len(lower):
+        if not len(self._running.sections) or not len(lower):
             return lower, upper
         middle, radius = 0.5 * (lower + upper), 0.5 * (upper - lower)
-        most = np.maximum.accumulate(np.maximum(np.abs(lower), np.abs(upper)), axis=0)
-        half = self._widened(radius) + self.rest * np.maximum.accumulate(radius, axis=0) + ROUNDING * most
-        centre = self.apply(middle)
+        most = np.maximum(np.maximum.accumulate(np.maximum(np.abs(lower), np.abs(upper)), axis=0), self._most)
+        widest = np.maximum(np.maximum.accumulate(radius, axis=0), self._widest)
+        self._most, self._widest = most[-1], widest[-1]
+        half = self._widened(radius) + self._running.rest * widest + ROUNDING * most
+        centre = self._middle.apply(middle)
         return centre - half, centre + half
 
     def _widened(self, radius: Array) -> Array:
         """Convolution of abs(h) with the half-widths, the first of which held for ever."""
         from scipy.signal import oaconvolve
 
-        size = np.abs(self.response)
-        held = np.concatenate([np.broadcast_to(radius[0], (len(size) - 1, radius.shape[1])), radius])
+        size = np.abs(self._running.response)
+        before = len(size) - 1
+        past = np.broadcast_to(radius[0], (before, radius.shape[1])) if self._held is None else self._held
+        held = np.concatenate([past, radius])
+        self._held = held[len(held) - before :].copy()
         return np.asarray(oaconvolve(held, size[:, None], mode="valid", axes=0))
 
 

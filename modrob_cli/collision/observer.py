@@ -52,6 +52,38 @@ def momentum_terms(robot: Robot, t: Array, q: Array, dq: Array, tau: Array) -> M
     return MomentumTerms(t, p, drift + tau - friction)
 
 
+class ObserverRun:
+    """The observer at work on one run, which comes piece by piece.
+
+    Parameters
+    ----------
+    gain : K > 0, the same for all joints [1/s]
+    """
+
+    def __init__(self, gain: float) -> None:
+        self._gain = gain
+        self._last: tuple[float, Array, Array, Array] | None = None
+
+    def add(self, terms: MomentumTerms) -> Array:
+        """Estimate r of the external torque at the next samples, shape (N, n); it starts at 0."""
+        if self._last is None:
+            self._last = float(terms.t[0]), terms.p[0], terms.drift[0], np.zeros_like(terms.p[0])
+        t, p, drift, before = self._last
+        steps = np.diff(terms.t, prepend=t)
+        pushed = np.diff(terms.p, axis=0, prepend=p[None])
+        mean = terms.drift.copy()
+        mean[1:] += terms.drift[:-1]
+        mean[0] += drift
+        pushed -= 0.5 * mean * steps[:, None]
+        r = np.empty_like(terms.p)
+        # r_k (1 + K h / 2) = r_{k-1} (1 - K h / 2) + K (change of p - integral of the drift).
+        for k, half in enumerate(0.5 * self._gain * steps):
+            before = (before * (1.0 - half) + self._gain * pushed[k]) / (1.0 + half)
+            r[k] = before
+        self._last = float(terms.t[-1]), terms.p[-1], terms.drift[-1], before
+        return r
+
+
 def external_torque(terms: MomentumTerms, gain: float) -> Array:
     """Estimate r of the external torque, shape (N, n), by the trapezoidal rule; it starts at 0.
 
@@ -59,11 +91,4 @@ def external_torque(terms: MomentumTerms, gain: float) -> Array:
     ----------
     gain : K > 0, the same for all joints [1/s]
     """
-    r = np.zeros_like(terms.p)
-    steps = np.diff(terms.t)
-    pushed = np.zeros_like(terms.p)
-    pushed[1:] = np.diff(terms.p, axis=0) - 0.5 * (terms.drift[1:] + terms.drift[:-1]) * steps[:, None]
-    # r_k (1 + K h / 2) = r_{k-1} (1 - K h / 2) + K (change of p - integral of the drift).
-    for k, half in enumerate(0.5 * gain * steps, start=1):
-        r[k] = (r[k - 1] * (1.0 - half) + gain * pushed[k]) / (1.0 + half)
-    return r
+    return ObserverRun(gain).add(terms)

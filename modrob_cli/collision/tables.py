@@ -17,16 +17,18 @@ Phases: constant velocity, where no acceleration exceeds a small part of the lar
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from modrob_cli.arrays import Array
 from modrob_cli.collision.events import Band
 from modrob_cli.collision.sensitivity import LinkPoint, point_jacobian
+from modrob_cli.collision.thinned import Thinned
 from modrob_cli.model.robot import Robot
 
 STEADY = 0.05
 """Part of the largest acceleration of each joint up to which a motion counts as one of constant velocity."""
 UPPER = 2.0
+MOST_POSES = 4000
+"""Of a longer phase, evenly picked poses tell about the wrench: every second, fourth, eighth and so on."""
 
 
 @dataclass(frozen=True)
@@ -53,42 +55,72 @@ class ThresholdTable:
     nominal: PhaseTable
 
 
-def steady_phase(ddq: Array) -> NDArray[np.bool_]:
-    """Samples of constant velocity, shape (N,), for accelerations (N, n)."""
-    most = np.abs(ddq).max(axis=0)
-    return np.asarray((np.abs(ddq) <= STEADY * most).all(axis=1))
-
-
-def threshold_table(robot: Robot, q: Array, ddq: Array, bands: Band, reach: int = 0) -> ThresholdTable:
-    """Constant thresholds that no admissible parameter reaches along this motion.
+class TableRun:
+    """Finds the thresholds of one motion, which comes piece by piece.
 
     Parameters
     ----------
-    q, ddq : shape (N, n);  bands : filtered, of the same samples
+    most : largest acceleration of each joint along the motion, shape (n,)
     reach : samples that the filter remembers; so much longer an acceleration counts as one
     """
-    half = np.maximum(bands.upper - bands.middle, bands.middle - bands.lower)
-    steady = steady_phase(ddq)
-    if reach:
-        recent = np.concatenate([[0], np.cumsum(~steady)])
-        first = np.maximum(np.arange(len(steady)) - reach, 0)
-        steady = steady & (recent[1:] - recent[first] == 0)
-    phases = [_phase(robot, q[mask], half[mask]) if mask.any() else None for mask in (~steady, steady)]
-    moving, constant = (phase or other for phase, other in zip(phases, phases[::-1], strict=True))
-    if moving is None or constant is None:
-        raise ValueError("a motion without samples")
-    return ThresholdTable(moving, constant)
+
+    def __init__(self, robot: Robot, most: Array, reach: int = 0) -> None:
+        self._robot, self._limit, self._reach = robot, STEADY * most, reach
+        self._phases = {name: _PhaseRun() for name in ("moving", "constant")}
+        self._since = reach + 1  # samples since the last acceleration
+
+    def add(self, q: Array, ddq: Array, bands: Band) -> None:
+        """Take the next samples: q, ddq of shape (N, n), and their filtered bands."""
+        half = np.maximum(bands.upper - bands.middle, bands.middle - bands.lower)
+        steady = np.asarray((np.abs(ddq) <= self._limit).all(axis=1))
+        k = np.arange(len(steady))
+        last = np.maximum.accumulate(np.where(steady, -self._since, k))
+        still = k - last > self._reach if self._reach else steady
+        self._since = min(int(k[-1] - last[-1]), self._reach) + 1
+        self._phases["moving"].add(q[~still], half[~still])
+        self._phases["constant"].add(q[still], half[still])
+
+    def table(self) -> ThresholdTable:
+        """The thresholds by all samples up to now."""
+        phases = [phase.table(self._robot) if phase.samples else None for phase in self._phases.values()]
+        moving, constant = (phase or other for phase, other in zip(phases, phases[::-1], strict=True))
+        if moving is None or constant is None:
+            raise ValueError("a motion without samples")
+        return ThresholdTable(moving, constant)
 
 
-def _phase(robot: Robot, q: Array, half: Array) -> PhaseTable:
-    tool = LinkPoint("tool", robot.dof + 1, np.zeros(3))
-    step = max(1, len(q) // 2000)
-    J = np.zeros((len(q[::step]), 6, robot.dof))
-    J[:, :3] = point_jacobian(robot, q[::step], tool)
-    frames = robot.link_frames(q[::step])
-    for i, joint in enumerate(robot.joints):
-        if joint.type == "revolute":
-            J[:, 3:, i] = frames[:, i, :3, 2]
-    inverse = np.abs(np.linalg.pinv(J.transpose(0, 2, 1)))
-    force = np.einsum("tkj,tj->tk", inverse, half[::step]).max(axis=0)
-    return PhaseTable(len(q), half.max(axis=0), force)
+def threshold_table(robot: Robot, q: Array, ddq: Array, bands: Band, reach: int = 0) -> ThresholdTable:
+    """Constant thresholds that no admissible parameter reaches along a whole motion; see :class:`TableRun`."""
+    run = TableRun(robot, np.abs(ddq).max(axis=0), reach)
+    run.add(q, ddq, bands)
+    return run.table()
+
+
+class _PhaseRun:
+    """One phase: its largest half-widths, and positions and half-widths at some samples for the wrench."""
+
+    def __init__(self) -> None:
+        self._picked = Thinned(MOST_POSES)
+        self._most = np.zeros(1)
+
+    @property
+    def samples(self) -> int:
+        return self._picked.count
+
+    def add(self, q: Array, half: Array) -> None:
+        if len(q):
+            self._most = np.maximum(self._most, half.max(axis=0))
+            self._picked.add(np.stack([q, half], axis=1))
+
+    def table(self, robot: Robot) -> PhaseTable:
+        q, half = self._picked.rows.transpose(1, 0, 2)
+        tool = LinkPoint("tool", robot.dof + 1, np.zeros(3))
+        J = np.zeros((len(q), 6, robot.dof))
+        J[:, :3] = point_jacobian(robot, q, tool)
+        frames = robot.link_frames(q)
+        for i, joint in enumerate(robot.joints):
+            if joint.type == "revolute":
+                J[:, 3:, i] = frames[:, i, :3, 2]
+        inverse = np.abs(np.linalg.pinv(J.transpose(0, 2, 1)))
+        force = np.einsum("tkj,tj->tk", inverse, half).max(axis=0)
+        return PhaseTable(self.samples, self._most, force)

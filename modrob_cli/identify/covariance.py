@@ -14,8 +14,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modrob_cli.arrays import Array, Indices
+
+Mask = NDArray[np.bool_]
 
 FEWEST = 4
 """Cosines at least; fewer degrees of freedom would make any interval useless."""
@@ -30,7 +33,7 @@ class Timeline:
 
     Attributes
     ----------
-    run : number of the run, shape (M,)
+    run : number of the run, shape (M,), not decreasing
     index : place in the evenly sampled run, shape (M,); what was left out shows as a hole
     lengths : samples of each run, holes included
     rate : [Hz], of each run
@@ -40,6 +43,12 @@ class Timeline:
     index: Indices
     lengths: tuple[int, ...]
     rate: tuple[float, ...]
+
+    def spans(self) -> list[tuple[int, slice]]:
+        """Number of each run that has samples, and where they are."""
+        numbers, starts = np.unique(self.run, return_index=True)
+        ends = [*starts[1:].tolist(), len(self.run)]
+        return [(k, slice(a, b)) for k, a, b in zip(numbers.tolist(), starts.tolist(), ends, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -72,22 +81,19 @@ def covariance(phi: Array, residual: Array, weights: Array, timeline: Timeline) 
     """
     scale = np.linalg.norm(phi, axis=0)
     scaled = phi / scale
-    # The derivative of Huber's influence function is 1 for samples that count in full and 0 for the others.
-    full = scaled[weights >= 1.0]
-    influence = scaled @ np.linalg.pinv(full.T @ full)
+    inverse = np.linalg.pinv(_gram(scaled, weights >= 1.0))
     basis = np.linalg.qr(scaled)[0]
     clipped = weights * residual
-    parts, kept, degrees, effective, bandwidths = [], [], [], 0.0, []
-    for k in range(len(timeline.lengths)):
-        mine = timeline.run == k
-        if not mine.any():
-            continue
+    parts, kept, sums, degrees, effective, bandwidths = [], [], [], [], 0.0, []
+    for k, mine in timeline.spans():
         index, length = timeline.index[mine], timeline.lengths[k]
         series = np.zeros(length)
         series[index] = clipped[mine]
-        independent = effective_samples(series, int(mine.sum()))
+        independent = effective_samples(series, len(index))
         cosines = max(FEWEST, round(0.4 * independent ** (2.0 / 3.0)))
-        part, share = _cosine_variance(influence[mine], clipped[mine], basis[mine], (index + 0.5) / length, cosines)
+        influence = scaled[mine] @ inverse
+        part, share = _cosine_variance(influence, clipped[mine], basis[mine], (index + 0.5) / length, cosines)
+        sums.append(clipped[mine] @ influence)
         parts.append(part)
         kept.append(share)
         degrees.append(cosines)
@@ -98,10 +104,19 @@ def covariance(phi: Array, residual: Array, weights: Array, timeline: Timeline) 
     matrix = small * np.sum(parts, axis=0) * np.outer(root, root)
     variance, dof = np.diag(matrix).copy(), _satterthwaite(np.array([np.diag(part) for part in parts]), degrees)
     if len(parts) >= FEWEST_LOGS:
-        between = _between_logs(influence * clipped[:, None], timeline)
+        between = _between_logs(np.array(sums))
         larger = between > variance
         variance, dof = np.where(larger, between, variance), np.where(larger, len(parts) - 1.0, dof)
     return Covariance(matrix / np.outer(scale, scale), np.sqrt(variance) / scale, dof, effective, min(bandwidths))
+
+
+def _gram(scaled: Array, counted: Mask) -> Array:
+    """Normal matrix of the samples that count in full, shape (p, p).
+
+    The derivative of Huber's influence function is 1 for them and 0 for the others.
+    """
+    full = scaled[counted]
+    return np.asarray(full.T @ full)
 
 
 def effective_samples(series: Array, count: int) -> float:
@@ -166,7 +181,11 @@ def _satterthwaite(shares: Array, degrees: Sequence[int]) -> Array:
     return np.where(squares > 0.0, total / np.where(squares > 0.0, squares, 1.0), float(sum(degrees)))
 
 
-def _between_logs(scores: Array, timeline: Timeline) -> Array:
-    """Variances, shape (p,), from the scatter between logs, which sees what stays the same throughout one log."""
-    sums = np.array([scores[timeline.run == k].sum(axis=0) for k in np.unique(timeline.run)])
+def _between_logs(sums: Array) -> Array:
+    """Variances, shape (p,), from the scatter between logs, which sees what stays the same throughout one log.
+
+    Parameters
+    ----------
+    sums : of the scores of each log, shape (logs, p)
+    """
     return np.asarray(len(sums) / (len(sums) - 1.0) * (sums**2).sum(axis=0))

@@ -1,7 +1,8 @@
 """Whose fault it is that a joint's torque remains unexplained: another joint, or gravity that is not in the record."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from modrob_cli.identify.covariance import covariance, quantile
 from modrob_cli.identify.friction_terms import FrictionShape, columns
 from modrob_cli.identify.regression import RegressionOptions
 from modrob_cli.identify.regression_result import JointEstimate
-from modrob_cli.identify.regression_rows import filtered_column, joint_motion, joint_rows, picked_runs, row_mask
+from modrob_cli.identify.regression_rows import joint_motion, joint_rows, picked_runs, row_mask
 from modrob_cli.identify.robust import robust_fit
 from modrob_cli.identify.run import Run
 
@@ -44,20 +45,26 @@ def coupling(train: Sequence[Run], test: Sequence[Run], j: int, estimate: JointE
     Friction and inertia of the other joint alone, and Coulomb friction of sum and difference of both velocities (as in
     wrists with coupled gears) are fitted to the residual together with the joint's own terms on ``train``, judged on
     ``test`` (on ``train`` where that is empty).
+
+    Parameters
+    ----------
+    train, test : the same logs, with other samples used
     """
     judge = test if any(run.used.any() for run in test) else train
-    own = _own(train, j, estimate), _own(judge, j, estimate)
-    residual = _residual(train, j, estimate), _residual(judge, j, estimate)
+    own = _both(train, judge, j, lambda run: _own(run, j, estimate))
+    residual = _both(train, judge, j, lambda run: _residual(run, j, estimate))
     left = [float(np.sum((r - x @ _solve(own[0], residual[0])) ** 2)) for x, r in zip(own, residual, strict=True)]
     best: Coupling | None = None
     for k in range(train[0].dq.shape[1]):
         if k == j or not any(run.signals.moving[k] for run in train):
             continue
-        wide = [np.column_stack([x, _other(runs, j, k, estimate)]) for x, runs in zip(own, (train, judge), strict=True)]
-        solution = _solve(wide[0], residual[0])
+        others = _both(train, judge, j, partial(_other, j=j, k=k, estimate=estimate))
+        solution = _solve(np.column_stack([own[0], others[0]]), residual[0])
+        count = own[0].shape[1]
         shares = [
-            1.0 - float(np.sum((r - x @ solution) ** 2)) / max(before, np.finfo(float).tiny)
-            for x, r, before in zip(wide, residual, left, strict=True)
+            1.0
+            - float(np.sum((r - x @ solution[:count] - y @ solution[count:]) ** 2)) / max(before, np.finfo(float).tiny)
+            for x, y, r, before in zip(own, others, residual, left, strict=True)
         ]
         if min(shares) > COUPLED and (best is None or min(shares) > best.share):
             best = Coupling(k, min(shares))
@@ -117,33 +124,36 @@ def _gravity_factor(
     return float(fit.values[-1]), max(float(cov.stderr[-1]), 1e-12), float(cov.dof[-1])
 
 
-def _own(runs: Sequence[Run], j: int, estimate: JointEstimate) -> Array:
-    """The joint's own linear columns at its rows, shape (M, p)."""
+def _both(train: Sequence[Run], judge: Sequence[Run], j: int, signal: Callable[[Run], Array]) -> tuple[Array, Array]:
+    """A signal at the rows of joint j of either set; of each log it is made and filtered once."""
+    picked = [set(picked_runs(runs, j)) for runs in (train, judge)]
+    found: tuple[list[Array], list[Array]] = ([], [])
+    for k in sorted(picked[0] | picked[1]):
+        filtered = train[k].filtered(signal(train[k]))
+        for parts, runs, chosen in zip(found, (train, judge), picked, strict=True):
+            if k in chosen:
+                parts.append(filtered[row_mask(runs[k], j)])
+    return np.concatenate(found[0]), np.concatenate(found[1])
+
+
+def _own(run: Run, j: int, estimate: JointEstimate) -> Array:
+    """The joint's own linear columns, shape (N, p)."""
     terms = [term for term in estimate.model() if term in ("offset", "coulomb", "viscous", "reflected_inertia")]
-    shape = FrictionShape(estimate.width)
-    return np.column_stack([filtered_column(runs, j, term, shape) for term in terms])
+    return columns(terms, joint_motion(run, j), FrictionShape(estimate.width))
 
 
-def _residual(runs: Sequence[Run], j: int, estimate: JointEstimate) -> Array:
-    parts = []
-    for k in picked_runs(runs, j):
-        run = runs[k]
-        left = run.tau[:, j] - run.tau_rigid[:, j] - estimate.torque(joint_motion(run, j))
-        parts.append(run.filtered(left)[row_mask(run, j)])
-    return np.concatenate(parts)
+def _residual(run: Run, j: int, estimate: JointEstimate) -> Array:
+    """What the joint's estimate leaves, shape (N,)."""
+    return np.asarray(run.tau[:, j] - run.tau_rigid[:, j] - estimate.torque(joint_motion(run, j)))
 
 
-def _other(runs: Sequence[Run], j: int, k: int, estimate: JointEstimate) -> Array:
-    """Columns of the other joint at the rows of joint j, shape (M, 5)."""
-    parts = []
-    for number in picked_runs(runs, j):
-        run = runs[number]
-        width = 0.5 * max(float(run.standstill[k]), np.finfo(float).tiny)
-        alone = columns(["viscous", "coulomb", "reflected_inertia"], joint_motion(run, k), FrictionShape(width))
-        both = max(width, estimate.width)
-        sums = [np.tanh((run.dq[:, j] + sign * run.dq[:, k]) / both) for sign in (1.0, -1.0)]
-        parts.append(run.filtered(np.column_stack([alone, *sums]))[row_mask(run, j)])
-    return np.concatenate(parts)
+def _other(run: Run, j: int, k: int, estimate: JointEstimate) -> Array:
+    """Columns of the other joint, shape (N, 5)."""
+    width = 0.5 * max(float(run.standstill[k]), np.finfo(float).tiny)
+    alone = columns(["viscous", "coulomb", "reflected_inertia"], joint_motion(run, k), FrictionShape(width))
+    both = max(width, estimate.width)
+    sums = [np.tanh((run.dq[:, j] + sign * run.dq[:, k]) / both) for sign in (1.0, -1.0)]
+    return np.column_stack([alone, *sums])
 
 
 def _solve(phi: Array, target: Array) -> Array:

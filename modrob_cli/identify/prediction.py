@@ -39,16 +39,18 @@ def prediction_errors(signals: Signals, recorded: Array, predicted: Array) -> li
     low_passed = [low_pass(x, signals.rate, signals.cutoff)[used] for x in (recorded, recorded - predicted)]
     rmse, size, low_size, low_rmse = (rms(x) for x in (residual, recorded[used], *low_passed))
     worst = np.argmax(np.abs(residual), axis=0)
+    largest, times = np.abs(residual[worst, np.arange(residual.shape[1])]), signals.t[used][worst]
     return [
-        PredictionError(
-            rmse=float(rmse[j]),
-            nrmse=_ratio(rmse[j], size[j]),
-            nrmse_low_passed=_ratio(low_rmse[j], low_size[j]),
-            max_error=float(np.abs(residual[worst[j], j])),
-            worst_time=float(signals.t[used][worst[j]]),
-        )
-        for j in range(recorded.shape[1])
+        error_of(rmse[j], size[j], low_rmse[j], low_size[j], largest[j], times[j]) for j in range(recorded.shape[1])
     ]
+
+
+def error_of(
+    rmse: float, size: float, low_rmse: float, low_size: float, max_error: float, worst_time: float
+) -> PredictionError:
+    """Error of one joint from RMS error and recorded torque, both low-passed, and the largest error."""
+    ratios = _ratio(rmse, size), _ratio(low_rmse, low_size)
+    return PredictionError(float(rmse), *ratios, float(max_error), float(worst_time))
 
 
 def rms(x: Array) -> Array:

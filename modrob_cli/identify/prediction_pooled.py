@@ -26,30 +26,60 @@ class PooledError:
     samples: int
 
 
-def pooled_errors(runs: Sequence[Run], predicted: Sequence[Array]) -> list[PooledError] | None:
-    """Errors per joint against the torque as recorded; None if no sample is used.
+@dataclass(frozen=True)
+class ErrorSums:
+    """Squares and largest error over the used samples of one run, from which errors over several runs follow.
+
+    Attributes
+    ----------
+    log : name of the run;  samples : how many count
+    squares : sums for error, recorded torque, and both low-passed, shape (4, n)
+    largest, time : largest error of each joint and when it occurs, shape (n,)
+    """
+
+    log: str
+    samples: int
+    squares: Array
+    largest: Array
+    time: Array
+
+
+def error_sums(parts: Sequence[Run], predicted: Array) -> list[ErrorSums]:
+    """Sums of each part of one log.
 
     Parameters
     ----------
-    predicted : for each run, shape (N, n), [N m] or [N]
+    parts : the same run, with other samples used
+    predicted : torque, shape (N, n), [N m] or [N]
     """
-    kept = [(run, torque) for run, torque in zip(runs, predicted, strict=True) if run.used.any()]
+    run = parts[0]
+    residual = run.tau - predicted
+    signals = (residual, run.tau, run.filtered(residual), run.filtered(run.tau))
+    found = []
+    for part in parts:
+        picked = [x[part.used] for x in signals]
+        squares = np.array([np.sum(x**2, axis=0) for x in picked])
+        size, joints = np.abs(picked[0]), np.arange(run.tau.shape[1])
+        largest = time = np.zeros(len(joints))
+        if len(size):
+            worst = np.argmax(size, axis=0)
+            largest, time = size[worst, joints], run.t[part.used][worst]
+        found.append(ErrorSums(run.name, len(size), squares, largest, time))
+    return found
+
+
+def errors_of(sums: Sequence[ErrorSums]) -> list[PooledError] | None:
+    """Errors per joint over all that was summed; None if no sample is used."""
+    kept = [part for part in sums if part.samples]
     if not kept:
         return None
-    recorded = np.concatenate([run.tau[run.used] for run, _ in kept])
-    residual = np.concatenate([(run.tau - torque)[run.used] for run, torque in kept])
-    low = np.concatenate([run.filtered(run.tau)[run.used] for run, _ in kept])
-    low_residual = np.concatenate([run.filtered(run.tau - torque)[run.used] for run, torque in kept])
-    times = np.concatenate([run.t[run.used] for run, _ in kept])
-    names = np.concatenate([np.full(int(run.used.sum()), k) for k, (run, _) in enumerate(kept)])
-    worst = np.argmax(np.abs(residual), axis=0)
+    samples = sum(part.samples for part in kept)
+    rmse, size, low_rmse, low_size = np.sqrt(np.sum([part.squares for part in kept], axis=0) / samples).tolist()
+    worst = np.argmax([part.largest for part in kept], axis=0)
     found = []
-    for j in range(recorded.shape[1]):
-        rmse, size, low_rmse, low_size = (
-            float(np.sqrt(np.mean(x[:, j] ** 2))) for x in (residual, recorded, low_residual, low)
-        )
-        ratio = rmse / size if size > 0.0 else None
-        low_ratio = low_rmse / low_size if low_size > 0.0 else None
-        error = PredictionError(rmse, ratio, low_ratio, float(abs(residual[worst[j], j])), float(times[worst[j]]))
-        found.append(PooledError(error, kept[int(names[worst[j]])][0].name, len(recorded)))
+    for j, k in enumerate(worst.tolist()):
+        ratio = rmse[j] / size[j] if size[j] > 0.0 else None
+        low_ratio = low_rmse[j] / low_size[j] if low_size[j] > 0.0 else None
+        error = PredictionError(rmse[j], ratio, low_ratio, float(kept[k].largest[j]), float(kept[k].time[j]))
+        found.append(PooledError(error, kept[k].log, samples))
     return found

@@ -10,7 +10,7 @@ from modrob_cli.identify import regression_excitation as excitation
 from modrob_cli.identify.covariance import Covariance, correlations, covariance, quantile
 from modrob_cli.identify.friction_terms import NON_NEGATIVE, FrictionModel, FrictionShape, columns
 from modrob_cli.identify.regression_result import Estimate, JointEstimate
-from modrob_cli.identify.regression_rows import Rows, filtered_column, joint_motion, joint_rows, picked_runs
+from modrob_cli.identify.regression_rows import Rows, filtered_column, joint_motion, joint_rows
 from modrob_cli.identify.regression_stribeck import sharpest, stribeck_velocity, transition_width
 from modrob_cli.identify.regression_units import GAIN, directional, fit_notes, in_torque
 from modrob_cli.identify.robust import RobustFit, robust_fit
@@ -122,9 +122,9 @@ class _Problem:
     def _with_gain(self, rows: Rows) -> Rows:
         """The rigid-body torque as second column, where it is admitted right after the offset."""
         parts = []
-        for k in picked_runs(self.runs, self.j):
-            mine = rows.timeline.index[rows.timeline.run == k]
-            parts.append(self.runs[k].filtered(self.runs[k].tau_rigid[:, self.j])[mine])
+        for k, mine in rows.timeline.spans():
+            index = rows.timeline.index[mine]
+            parts.append(self.runs[k].filtered(self.runs[k].tau_rigid[:, self.j])[index])
         wider = rows.joined(GAIN, np.concatenate(parts))
         return wider.only(["offset", GAIN, *rows.terms[1:]])
 
@@ -240,5 +240,5 @@ class _Problem:
         if not self.options.offset_per_log:
             return {}
         rest = self.all_rows.target - self.all_rows.phi @ solution.fit.values
-        runs = self.rows.timeline.run
-        return {self.runs[k].name: scale * float(np.mean(rest[runs == k])) for k in np.unique(runs)}
+        spans = self.rows.timeline.spans()
+        return {self.runs[k].name: scale * float(np.mean(rest[mine])) for k, mine in spans}

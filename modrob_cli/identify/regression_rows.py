@@ -33,6 +33,8 @@ class Rows:
 
     def only(self, terms: Sequence[str]) -> "Rows":
         """Some of the columns."""
+        if tuple(terms) == self.terms:
+            return self  # millions of rows are not copied in vain
         picked = [self.terms.index(term) for term in terms]
         return replace(self, terms=tuple(terms), phi=self.phi[:, picked])
 
@@ -49,26 +51,24 @@ class Rows:
     def residual(self, weights: Array) -> Array:
         """What weighted least squares leaves of the target, times the root of the weights, shape (M,)."""
         root = np.sqrt(weights)
-        phi, target = self.phi * root[:, None], self.target * root
-        scale = np.linalg.norm(phi, axis=0)
-        scaled = phi / np.where(scale > 0.0, scale, 1.0)
+        scaled, target = self.phi * root[:, None], self.target * root
+        scale = np.linalg.norm(scaled, axis=0)
+        scaled /= np.where(scale > 0.0, scale, 1.0)
         return np.asarray(target - scaled @ np.linalg.lstsq(scaled, target, rcond=None)[0])
 
     def effective(self, residual: Array) -> float:
         """Number of independent samples that carry as much as this residual does, shape (M,)."""
         line, total = self.timeline, 0.0
-        for k in np.unique(line.run):
-            mine = line.run == k
+        for k, mine in line.spans():
             series = np.zeros(line.lengths[k])
             series[line.index[mine]] = residual[mine]
-            total += effective_samples(series, int(mine.sum()))
+            total += effective_samples(series, mine.stop - mine.start)
         return total
 
     def centred(self) -> "Rows":
         """Each log's means taken out of columns and target, which is what an offset per log amounts to."""
         phi, target = self.phi.copy(), self.target.copy()
-        for k in np.unique(self.timeline.run):
-            mine = self.timeline.run == k
+        for _, mine in self.timeline.spans():
             phi[mine] -= phi[mine].mean(axis=0)
             target[mine] -= target[mine].mean()
         return replace(self, phi=phi, target=target)

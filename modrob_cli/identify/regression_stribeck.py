@@ -56,16 +56,21 @@ def transition_width(runs: Sequence[Run], j: int, rows: Rows, fit: RobustFit, pe
     if not 2.0 * narrow < WIDEST * speed:
         return narrow
     grid = np.geomspace(narrow, WIDEST * speed, GRID)
-    residuals = []
-    for width in grid:
+    sizes = np.full(GRID, np.inf)
+    residual = np.empty(0)
+    for k, width in enumerate(grid):
         changed = rows.replaced("coulomb", filtered_column(runs, j, "coulomb", FrictionShape(float(width))))
-        residuals.append((changed.centred() if per_log else changed).residual(weights))
-    sizes = np.array([float(np.sqrt(np.mean(residual**2))) for residual in residuals])
+        left = (changed.centred() if per_log else changed).residual(weights)
+        size = float(np.sqrt(np.mean(left**2)))
+        if size < sizes.min():
+            residual = left
+        sizes[k] = size
     best = int(np.argmin(sizes))
-    size = np.sqrt(np.mean(np.concatenate([run.tau[run.used, j] for run in runs]) ** 2))
-    matters = sizes[0] - sizes[best] > WORTH * size
-    ratio = 2.0 * np.log(sizes[0] / max(sizes[best], np.finfo(float).tiny)) if matters else 0.0
-    return float(grid[best]) if rows.effective(residuals[best]) * ratio > CHI_SQUARE else narrow
+    torque = np.sqrt(np.mean(np.concatenate([run.tau[run.used, j] for run in runs]) ** 2))
+    if not sizes[0] - sizes[best] > WORTH * torque:
+        return narrow
+    ratio = 2.0 * np.log(sizes[0] / max(sizes[best], np.finfo(float).tiny))
+    return float(grid[best]) if rows.effective(residual) * ratio > CHI_SQUARE else narrow
 
 
 def stribeck_velocity(

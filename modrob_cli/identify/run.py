@@ -118,8 +118,13 @@ def prepare_run(robot: Robot, log: JointLog, effort: EffortKind, cutoff: float |
     tau_rigid = rnea(model, signals.q, signals.dq, signals.ddq)
     noise = motion_noise(log, signals.cutoff)
     speed = np.sqrt(np.mean(signals.dq[signals.used] ** 2, axis=0))
-    standstill = np.maximum(np.maximum(STANDSTILL * speed, NOISE_MULTIPLE * noise[0]), SLOWEST)
+    standstill = standstill_of(speed, noise[0])
     fast = np.mean(np.abs(signals.dq[signals.used]) > standstill, axis=0) > LEAST_FAST
     signals = replace(signals, moving=signals.moving & fast)
-    tau = signals.effort * factors
+    tau = signals.effort if np.all(factors == 1.0) else signals.effort * factors
     return Run(log.name, signals, tau, tau_rigid, signals.used, *noise, standstill, gravity, glitches)
+
+
+def standstill_of(speed: Array, noise: Array) -> Array:
+    """Velocities taken for standstill from RMS velocity and its noise, shape (n,) each, [rad/s] or [m/s]."""
+    return np.asarray(np.maximum(np.maximum(STANDSTILL * speed, NOISE_MULTIPLE * noise), SLOWEST))

@@ -56,15 +56,25 @@ def choose_cutoff(log: JointLog) -> CutoffChoice:
     P.-O. Vandanjon, IEEE Trans. Control Syst. Technol. 21 (2013)); the limits are ours.
     """
     rate = 1.0 / float(np.median(np.diff(log.t)))
-    x = log.q if log.dq is None else log.dq
-    frequency, density = spectrum(x, rate)
-    power = velocity_power(frequency, density, derived=log.dq is None)
+    frequency, density = spectrum(log.q if log.dq is None else log.dq, rate)
+    return cutoff_from(frequency, density, rate, np.ptp(log.q, axis=0), derived=log.dq is None)
+
+
+def cutoff_from(frequency: Array, density: Array, rate: float, extent: Array, derived: bool) -> CutoffChoice:
+    """The choice from the spectrum of the velocities, or of the positions if ``derived``.
+
+    Parameters
+    ----------
+    frequency, density : shapes (F,) and (F, n), as those of :func:`spectrum`
+    extent : range of the positions, shape (n,), [rad] or [m]
+    """
+    power = velocity_power(frequency, density, derived)
     floor = noise_floor(frequency, density, rate)
     counted = np.where(density > NOISE_FACTOR * floor, power, 0.0)
     total = np.cumsum(counted, axis=0)
     reached = total >= BANDWIDTH_SHARE * np.maximum(total[-1], np.finfo(float).tiny)
     bandwidth = np.where(total[-1] > 0.0, frequency[np.argmax(reached, axis=0)], np.nan)
-    known = bandwidth[np.isfinite(bandwidth) & (np.ptp(log.q, axis=0) > 5e-3)]
+    known = bandwidth[np.isfinite(bandwidth) & (extent > 5e-3)]
     middle = float(np.median(known)) if len(known) else 0.0
     top = RATE_SHARE * rate
     cutoff = min(float(np.clip(MULTIPLE * middle, LOWEST, HIGHEST)), top)
@@ -85,9 +95,18 @@ def spectrum(x: Array, rate: float) -> tuple[Array, Array]:
     frequency : shape (F,), [Hz]
     density : shape (F, ...), in the square of the unit of x per Hz
     """
+    return welch_spectrum(x, rate, segment_length(len(x)))
+
+
+def segment_length(samples: int) -> int:
+    """Samples of a segment, so that there are eight."""
+    return min(samples, max(64, int(samples / 4.5)))
+
+
+def welch_spectrum(x: Array, rate: float, length: int) -> tuple[Array, Array]:
+    """As :func:`spectrum`, by segments of this length."""
     from scipy.signal import welch
 
-    length = min(len(x), max(64, int(len(x) / 4.5)))
     frequency, density = welch(x, fs=rate, window="hann", nperseg=length, detrend="linear", axis=0)
     return np.asarray(frequency), np.asarray(density)
 
@@ -112,9 +131,13 @@ def motion_noise(log: JointLog, cutoff: float) -> tuple[Array, Array]:
     underestimated. The filter is that of :mod:`modrob_cli.identify.signals`, gain 1 / (1 + (f / cutoff)^8).
     """
     rate = 1.0 / float(np.median(np.diff(log.t)))
-    x, order = (log.q, 1) if log.dq is None else (log.dq, 0)
-    frequency, density = spectrum(x, rate)
-    floor = noise_floor(frequency, density, rate)
+    frequency, density = spectrum(log.q if log.dq is None else log.dq, rate)
+    return noise_from(noise_floor(frequency, density, rate), rate, cutoff, derived=log.dq is None)
+
+
+def noise_from(floor: Array, rate: float, cutoff: float, derived: bool) -> tuple[Array, Array]:
+    """The same from the noise floor of the velocities, or of the positions if ``derived``, shape (n,)."""
+    order = 1 if derived else 0
     fine = np.linspace(0.0, 0.5 * rate, 2000)
     passed = 1.0 / (1.0 + (fine / cutoff) ** 8) ** 2
     angular = 2.0 * np.pi * fine

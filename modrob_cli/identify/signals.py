@@ -1,6 +1,7 @@
 """From a log to evenly sampled positions, velocities and accelerations without phase shift."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,11 @@ JITTER = 0.01
 
 VELOCITY_BAND = 0.03
 """Half-width of the band around standstill, as a share of the RMS velocity of the joint."""
+
+FEWEST_USED = 50
+"""Samples that a log has to have beyond its ends and gaps."""
+
+ALL = slice(None)
 
 
 @dataclass(frozen=True)
@@ -78,40 +84,93 @@ def prepare(log: JointLog, cutoff: float | None = None) -> Signals:
         If the log is too short.
     """
     steps = np.diff(log.t)
-    step = float(np.median(steps))
-    cutoff = min(DEFAULT_CUTOFF, 0.25 / step) if cutoff is None else cutoff
-    if not 0.0 < cutoff < 0.5 / step:
-        limit = f"half the sampling rate of {log.name}, {0.5 / step:.5g} Hz"
-        raise UsageError(f"--cutoff: found {cutoff:g} Hz, expected more than 0 and less than {limit}")
-    resampled = bool(np.max(np.abs(steps - step)) > JITTER * step)
-    t, q, dq, effort = _resample(log, step) if resampled else (log.t, log.q, log.dq, log.effort)
-    used = _used(t, log.t, step, cutoff)
-    if np.count_nonzero(used) < 50:
-        raise NumericalError(
-            f"{log.name} lasts {t[-1]:.3g} s with {len(log.t)} samples; without {MARGIN / cutoff:.2g} s at each end "
-            "and around gaps fewer than 50 samples are left; use a longer log or a higher --cutoff"
-        )
-    q_low = low_pass(q, 1.0 / step, cutoff)
-    if dq is None:
-        spline = _spline(t, q_low)
-        velocity, acceleration = spline.derivative(1)(t), spline.derivative(2)(t)
-    else:
-        velocity = low_pass(dq, 1.0 / step, cutoff)
-        acceleration = _spline(t, velocity).derivative(1)(t)
-    moving = _moving(q[used], q_low[used])
+    step, gap = float(np.median(steps)), float(np.max(steps))
+    cutoff = checked_cutoff(log.name, cutoff, step)
+    resampled = uneven(float(np.min(steps)), gap, step)
+    t, q, dq, effort = (log.t, log.q, log.dq, log.effort)
+    if resampled:
+        t = np.arange(grid_size(log.t[-1], step), dtype=float) * step
+        q, dq, effort = resample(log, t)
+    used = used_samples(t, (t[0], t[-1]), log.t, step, cutoff)
+    check_used(log.name, float(t[-1]), len(log.t), int(np.count_nonzero(used)), cutoff)
+    q_low, velocity, acceleration = filtered_motion(t, q, dq, 1.0 / step, cutoff)
+    moving = in_motion(np.mean((q[used] - q_low[used]) ** 2, axis=0), np.ptp(q_low[used], axis=0))
     band = VELOCITY_BAND * np.sqrt(np.mean(velocity[used] ** 2, axis=0))
-    gap = float(np.max(steps))
     motion = (q_low, velocity, acceleration)
     return Signals(t, *motion, effort, used, moving, band, 1.0 / step, cutoff, resampled, gap)
 
 
+def checked_cutoff(name: str, cutoff: float | None, step: float) -> float:
+    """The cut-off frequency [Hz], or a default; errors as those of :func:`prepare`."""
+    cutoff = min(DEFAULT_CUTOFF, 0.25 / step) if cutoff is None else cutoff
+    if not 0.0 < cutoff < 0.5 / step:
+        limit = f"half the sampling rate of {name}, {0.5 / step:.5g} Hz"
+        raise UsageError(f"--cutoff: found {cutoff:g} Hz, expected more than 0 and less than {limit}")
+    return cutoff
+
+
+def uneven(shortest: float, longest: float, step: float) -> bool:
+    """Whether steps [s] between these differ too much from the median one."""
+    return max(longest - step, step - shortest) > JITTER * step
+
+
+def grid_size(end: float, step: float) -> int:
+    """Number of even times from 0 to ``end`` [s]."""
+    return int(np.floor(end / step * (1.0 + 1e-12))) + 1
+
+
+def check_used(name: str, duration: float, samples: int, used: int, cutoff: float) -> None:
+    """Refuse a log that is too short; errors as those of :func:`prepare`."""
+    if used < FEWEST_USED:
+        raise NumericalError(
+            f"{name} lasts {duration:.3g} s with {samples} samples; without {MARGIN / cutoff:.2g} s at each end "
+            f"and around gaps fewer than {FEWEST_USED} samples are left; use a longer log or a higher --cutoff"
+        )
+
+
+def filtered_motion(
+    t: Array, q: Array, dq: Array | None, rate: float, cutoff: float, core: slice = ALL
+) -> tuple[Array, Array, Array]:
+    """Low-passed positions, velocities, accelerations at the samples ``core``, from samples (N, n) at all times."""
+    q_low = low_pass(q, rate, cutoff)
+    if dq is None:
+        spline = _spline(t, q_low)
+        return q_low[core], spline.derivative(1)(t[core]), spline.derivative(2)(t[core])
+    velocity = low_pass(dq, rate, cutoff)
+    return q_low[core], velocity[core], _spline(t, velocity).derivative(1)(t[core])
+
+
+def filter_memory(rate: float, cutoff: float) -> int:
+    """Samples after which less than 1e-15 is left of what the low-pass saw, by the slowest of its poles."""
+    from scipy.signal import butter
+
+    _, poles, _ = butter(ORDER, cutoff, fs=rate, output="zpk")
+    return int(np.ceil(np.log(1e-15) / np.log(np.max(np.abs(poles)))))
+
+
 def low_pass(x: Array, rate: float, cutoff: float) -> Array:
     """Zero-phase Butterworth filter along the first axis; the gain at the cut-off frequency is 1/2."""
-    from scipy.signal import butter, sosfiltfilt
+    from scipy.signal import sosfilt
+
+    sections, start = _design(rate, cutoff)
+    pad = min(len(x) - 1, int(np.ceil(rate / cutoff)))
+    # As scipy.signal.sosfiltfilt, which would find the steady state of the sections anew each time, and that takes
+    # longer than filtering: each end is continued by its reflection in the last point.
+    y = np.concatenate([2.0 * x[0] - x[pad:0:-1], x, 2.0 * x[-1] - x[-2 : -pad - 2 : -1]]) if pad else x
+    start = start.reshape(start.shape + (1,) * (x.ndim - 1))
+    for _ in range(2):
+        y, _ = sosfilt(sections, y, axis=0, zi=start * y[0])
+        y = y[::-1]
+    return np.array(y[pad : len(y) - pad])
+
+
+@lru_cache(maxsize=1024)
+def _design(rate: float, cutoff: float) -> tuple[Array, Array]:
+    """Second-order sections (S, 6) of the filter, and the state (S, 2) in which they answer 1 with 1."""
+    from scipy.signal import butter, sosfilt_zi
 
     sections = butter(ORDER, cutoff, fs=rate, output="sos")
-    pad = min(len(x) - 1, int(np.ceil(rate / cutoff)))
-    return np.asarray(sosfiltfilt(sections, x, axis=0, padlen=pad))
+    return np.asarray(sections), np.asarray(sosfilt_zi(sections))
 
 
 def _spline(t: Array, x: Array) -> Any:
@@ -120,28 +179,40 @@ def _spline(t: Array, x: Array) -> Any:
     return make_interp_spline(t, x, k=5)
 
 
-def _resample(log: JointLog, step: float) -> tuple[Array, Array, Array | None, Array]:
-    """Even times; positions and velocities by cubic splines, efforts (which may jump) along straight lines."""
+def resample(log: JointLog, t: Array) -> tuple[Array, Array | None, Array]:
+    """Positions and velocities at times t by cubic splines, efforts (which may jump) along straight lines."""
     from scipy.interpolate import make_interp_spline
 
-    t = np.arange(int(np.floor(log.t[-1] / step * (1.0 + 1e-12))) + 1, dtype=float) * step
     q = np.asarray(make_interp_spline(log.t, log.q, k=3)(t))
     dq = None if log.dq is None else np.asarray(make_interp_spline(log.t, log.dq, k=3)(t))
     effort = np.stack([np.interp(t, log.t, column) for column in log.effort.T], axis=1)
-    return t, q, dq, effort
+    return q, dq, effort
 
 
-def _used(t: Array, recorded: Array, step: float, cutoff: float) -> Mask:
-    """Mark the samples that no end of the recording and no gap in it can have reached through the filter."""
+def used_samples(t: Array, ends: tuple[float, float], recorded: Array, step: float, cutoff: float) -> Mask:
+    """Mark the samples that no end of the recording and no gap in it can have reached through the filter.
+
+    Parameters
+    ----------
+    t : increasing times, shape (N,), [s]
+    ends : first and last time of the recording, [s]
+    recorded : times as recorded, those of the gaps among them, shape (M,), [s]
+    """
     margin = MARGIN / cutoff
-    used = np.asarray((t >= t[0] + margin) & (t <= t[-1] - margin))
+    used = np.asarray((t >= ends[0] + margin) & (t <= ends[1] - margin))
     gaps = np.flatnonzero(np.diff(recorded) > max(0.25 / cutoff, 1.5 * step))
-    for start, end in zip(recorded[gaps], recorded[gaps + 1], strict=True):
-        used &= (t <= start - margin) | (t >= end + margin)
+    first = np.searchsorted(t, recorded[gaps] - margin, "right")
+    last = np.searchsorted(t, recorded[gaps + 1] + margin, "left")
+    for start, end in zip(first, last, strict=True):
+        used[start:end] = False
     return used
 
 
-def _moving(q: Array, q_low: Array) -> Mask:
-    """Joints whose range exceeds 0.005 rad (or m) and ten times the noise that the filter took out."""
-    noise = np.sqrt(np.mean((q - q_low) ** 2, axis=0))
-    return np.asarray(np.ptp(q_low, axis=0) > np.maximum(5e-3, 10.0 * noise))
+def in_motion(noise: Array, extent: Array) -> Mask:
+    """Joints whose range exceeds 0.005 rad (or m) and ten times the noise that the filter took out.
+
+    Parameters
+    ----------
+    noise : mean square of what the filter took out, shape (n,);  extent : range of the positions, shape (n,)
+    """
+    return np.asarray(extent > np.maximum(5e-3, 10.0 * np.sqrt(noise)))

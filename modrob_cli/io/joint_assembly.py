@@ -48,13 +48,23 @@ def times_of(table: JointTable, time: TimeSource) -> Stamps:
     if time == "log":
         return table.log_times
     known = table.stamps[table.stamps != NO_STAMP]
-    if 2 * len(known) < len(table.stamps):
-        missing = len(table.stamps) - len(known)
-        found = f"{missing} of {len(table.stamps)} messages have no time stamp"
-        raise ValueError(f"{found}; take the times of the recorder: --time log")
-    if not known.any():
-        raise ValueError("all header stamps are 0; take the times of the recorder: --time log")
+    check_header_times(len(table.stamps), len(known), bool(known.any()))
     return table.stamps
+
+
+def check_header_times(messages: int, known: int, nonzero: bool) -> None:
+    """Refuse header stamps most of which are missing, or that are all zero.
+
+    Raises
+    ------
+    ValueError
+        If so.
+    """
+    if 2 * known < messages:
+        found = f"{messages - known} of {messages} messages have no time stamp"
+        raise ValueError(f"{found}; take the times of the recorder: --time log")
+    if not nonzero:
+        raise ValueError("all header stamps are 0; take the times of the recorder: --time log")
 
 
 def put_in_order(table: JointTable, time: TimeSource) -> tuple[JointTable, Stamps, list[str]]:
@@ -67,29 +77,42 @@ def put_in_order(table: JointTable, time: TimeSource) -> tuple[JointTable, Stamp
     """
     times, notes = times_of(table, time), []
     known = np.flatnonzero(times != NO_STAMP)
-    kept = known[~_stray(times[known])]
+    kept = known[~stray(times[known])]
     if len(kept) < len(times):
-        left = len(times) - len(kept)
-        notes.append(f"{left} messages have no time or one far from their neighbours' and were left out")
+        notes.append(left_out(len(times) - len(kept)))
         table, times = table.pick(kept), times[kept]
     late = np.maximum.accumulate(times) - times
     worst = int(late.max(initial=0))
     if worst > SORTED_STEP:
         k = int(np.argmax(late > SORTED_STEP))
-        advice = ", or take the times of the recorder: --time log" if time == "header" else ""
-        raise ValueError(
-            f"time goes back by {late[k] / 1e9:.6g} s after message {k}: a clock that was set, a recording that was "
-            f"started again, or two publishers; cut the file there{advice}"
-        )
+        raise ValueError(goes_back(int(late[k]), k, time))
     if worst:
         order = np.argsort(times, kind="stable")
         table, times = table.pick(order), times[order]
-        count = int(np.count_nonzero(late))
-        notes.append(f"sorted by time: {count} messages came after a later one, by {worst / 1e9:.3g} s at most")
+        notes.append(was_sorted(int(np.count_nonzero(late)), worst))
     return table, times, notes
 
 
-def _stray(times: Stamps) -> Mask:
+def left_out(count: int) -> str:
+    """A note on messages with impossible times."""
+    return f"{count} messages have no time or one far from their neighbours' and were left out"
+
+
+def was_sorted(count: int, worst: int) -> str:
+    """A note on messages that came late, by ``worst`` [ns] at most."""
+    return f"sorted by time: {count} messages came after a later one, by {worst / 1e9:.3g} s at most"
+
+
+def goes_back(late: int, k: int, time: TimeSource) -> str:
+    """What is wrong with message k, which is ``late`` [ns]."""
+    advice = ", or take the times of the recorder: --time log" if time == "header" else ""
+    return (
+        f"time goes back by {late / 1e9:.6g} s after message {k}: a clock that was set, a recording that was "
+        f"started again, or two publishers; cut the file there{advice}"
+    )
+
+
+def stray(times: Stamps) -> Mask:
     """Single messages whose times are far from those before and after, which are in order: damaged stamps."""
     out = np.zeros(len(times), dtype=bool)
     if len(times) < 3:

@@ -5,6 +5,7 @@ messages have in common (channel, order of the joints, frame, quantities); if no
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modrob_cli.arrays import Array, Indices
 from modrob_cli.io.joint_batch import Source
@@ -19,6 +20,9 @@ LEAST, SHARE = 5, 0.005
 EXPLAINED = 0.4
 """Share of all jumps that must be there-and-back (two jumps each, or one each where messages alternate); else the
 positions are just noisy."""
+
+OVERLAP = "two publishers send the same joints at the same time"
+"""Why two channels contradict one another."""
 
 _BLOCK = 100_000
 """Runs that are compared at once; bounds the memory."""
@@ -40,13 +44,37 @@ def jumps(q: Array, first: Indices, last: Indices) -> tuple[Indices, int]:
     found, total = [np.empty(0, dtype=np.intp)], 0
     for begin in range(0, len(first) - 2, _BLOCK):
         begins, ends = first[begin : begin + _BLOCK + 2], last[begin : begin + _BLOCK + 2]
-        # fmax passes over NaN: a joint without a position says nothing.
-        step = np.fmax.reduce(np.abs(q[begins[1:]] - q[ends[:-1]]), axis=1)
-        across = np.fmax.reduce(np.abs(q[begins[2:]] - q[ends[:-2]]), axis=1)
-        away = np.minimum(step[:-1], step[1:])
-        found.append(begins[1:-1][(away > JUMP) & (across < RETURN * away)])
-        total += int(np.count_nonzero(step[:_BLOCK] > JUMP))
+        away, jumped = compare_runs(q[begins], q[ends])
+        found.append(begins[1:-1][away])
+        total += int(np.count_nonzero(jumped[:_BLOCK]))
     return np.concatenate(found), total
+
+
+def compare_runs(first: Array, last: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which of R runs jump away from their neighbours, which agree; and between which neighbours there is a jump.
+
+    Parameters
+    ----------
+    first, last : positions in the first and last message of each run, shape (R, n), R >= 2
+
+    Returns
+    -------
+    away : shape (R - 2,), of all runs but the first and the last one
+    jumped : shape (R - 1,)
+    """
+    steps = np.abs(first[1:] - last[:-1])
+    if not np.any(steps > JUMP):  # as in most logs, and found out in a fraction of the time
+        return np.zeros(len(steps) - 1, dtype=bool), np.zeros(len(steps), dtype=bool)
+    # fmax passes over NaN: a joint without a position says nothing.
+    step = np.fmax.reduce(steps, axis=1)
+    across = np.fmax.reduce(np.abs(first[2:] - last[:-2]), axis=1)
+    away = np.minimum(step[:-1], step[1:])
+    return (away > JUMP) & (across < RETURN * away), step > JUMP
+
+
+def too_many(found: int, total: int, messages: int) -> bool:
+    """Whether so many jumps to and fro among all jumps and messages mean another publisher."""
+    return found >= max(LEAST, SHARE * messages, EXPLAINED * total)
 
 
 def conflict(table: JointTable) -> str:
@@ -55,7 +83,7 @@ def conflict(table: JointTable) -> str:
     Messages are compared with their neighbours; where sources take turns, so are runs of messages of one source.
     """
     if _channels_that_overlap(table):
-        return "two publishers send the same joints at the same time"
+        return OVERLAP
     if not table.has.all():
         return ""
     q = table.values[0]
@@ -63,17 +91,18 @@ def conflict(table: JointTable) -> str:
     starts = np.flatnonzero(np.diff(table.owner, prepend=-1))
     for first, last in ((single, single), (starts, np.append(starts[1:], len(q)) - 1)):
         found, total = jumps(q, first, last)
-        if len(found) >= max(LEAST, SHARE * len(q), EXPLAINED * total):
-            return _describe_jumps(table, found)
+        if too_many(len(found), total, len(q)):
+            k = int(found[0])
+            return describe_jumps(table.names, q[k - 1 : k + 2], k, len(found), len(q))
     return ""
 
 
-def _describe_jumps(table: JointTable, found: Indices) -> str:
-    q, k = table.values[0], int(found[0])
-    joint = int(np.nanargmax(np.abs(q[k] - q[k - 1])))
-    values = " -> ".join(f"{value:.4g}" for value in q[k - 1 : k + 2, joint])
-    text = f"the positions jump to and fro at {len(found)} of {len(q)} messages"
-    return f"{text} (first at message {k + 1}, {table.names[joint]}: {values}): two publishers on one topic"
+def describe_jumps(names: tuple[str, ...], q: Array, k: int, found: int, messages: int) -> str:
+    """Describe the jumps by the first one, at message k; ``q`` (3, n) is before, at and after it."""
+    joint = int(np.nanargmax(np.abs(q[1] - q[0])))
+    values = " -> ".join(f"{value:.4g}" for value in q[:, joint])
+    text = f"the positions jump to and fro at {found} of {messages} messages"
+    return f"{text} (first at message {k + 1}, {names[joint]}: {values}): two publishers on one topic"
 
 
 def _channels_that_overlap(table: JointTable) -> bool:

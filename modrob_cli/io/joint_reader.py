@@ -13,7 +13,7 @@ from modrob_cli.errors import Fault, InputFileError, UsageError
 from modrob_cli.io.joint_assembly import Samples, assemble, put_in_order
 from modrob_cli.io.joint_batch import Source
 from modrob_cli.io.joint_publishers import conflict, describe
-from modrob_cli.io.joint_series import JointSeries, JointTable
+from modrob_cli.io.joint_series import JointSeries
 from modrob_cli.io.joint_topics import ACCEPTED, JointTopics
 from modrob_cli.io.log_options import LogOptions
 from modrob_cli.model.log import Recording
@@ -32,35 +32,50 @@ class JointReader:
 
     def read(self) -> Recording:
         """Read the file."""
-        for channel, batch in self.topics.batches(best_only=self.options.topic is None):
-            if channel.topic not in self._series or channel.rank < self._ranks[channel.topic]:
-                self._series[channel.topic] = JointSeries(self.wanted, self.options.joint_map)
-                self._ranks[channel.topic] = channel.rank
-                self._forget(channel.rank)
-            self._series[channel.topic].add(batch)
-        topic = self._choose_topic()
+        topic, names, losses = self._collect()
         series = self._series.pop(topic)
-        losses = self._losses(topic)
-        if self.options.strict and losses:
-            self._raise(f"--strict refuses a file that is damaged: {'; '.join(losses)}")
-        self._choose_publisher(series)
-        names = self._names(series, topic)
         try:
             table = series.table(names)
             contradiction = conflict(table)
             if contradiction and self.options.publisher is None:
-                self._raise_publishers(contradiction, table, series.numbers)
+                counts = np.bincount(table.owner, minlength=len(table.sources)).tolist()
+                self._raise_publishers(contradiction, dict(zip(table.sources, counts, strict=True)), series.numbers)
             table, times, notes = put_in_order(table, self.options.time)
             samples = assemble(table, times)
         except ValueError as error:
             self._raise(str(error))
         return self._recording(topic, names, samples, [*losses, *self._ignored(series), *notes, *samples.notes])
 
+    def _collect(self) -> tuple[str, tuple[str, ...], list[str]]:
+        """Read the whole file into series; the topic, the joints and the losses that count."""
+        for channel, batch in self.topics.batches(best_only=self.options.topic is None):
+            if channel.topic not in self._series or channel.rank < self._ranks[channel.topic]:
+                self._give_up(channel.topic)
+                self._series[channel.topic] = self._new_series(channel.topic)
+                self._ranks[channel.topic] = channel.rank
+                self._forget(channel.rank)
+            self._series[channel.topic].add(batch)
+        topic = self._choose_topic()
+        losses = self._losses(topic)
+        if self.options.strict and losses:
+            self._raise(f"--strict refuses a file that is damaged: {'; '.join(losses)}")
+        self._choose_publisher(self._series[topic])
+        return topic, self._names(self._series[topic], topic), losses
+
+    def _new_series(self, topic: str) -> JointSeries:
+        """Something that collects the batches of a topic."""
+        return JointSeries(self.wanted, self.options.joint_map)
+
+    def _give_up(self, topic: str) -> None:
+        """Forget what was collected of a topic."""
+        self._series.pop(topic, None)
+        self._ranks.pop(topic, None)
+
     def _forget(self, rank: int) -> None:
         """Give up topics of higher ranks than one that has messages, unless the topic is named."""
         if self.options.topic is None:
             for topic in [topic for topic, other in self._ranks.items() if other > rank]:
-                del self._series[topic], self._ranks[topic]
+                self._give_up(topic)
 
     def _losses(self, topic: str | None) -> list[str]:
         """What of the file, and of a topic (None: of any), cannot be used, for people."""
@@ -145,13 +160,12 @@ class JointReader:
             raise UsageError(f"--publisher: {found}: {describe(numbers, series.counts)}")
         series.keep(chosen[0])
 
-    def _raise_publishers(self, contradiction: str, table: JointTable, numbers: dict[Source, int]) -> NoReturn:
-        if len(table.sources) == 1:
+    def _raise_publishers(self, contradiction: str, counts: dict[Source, int], numbers: dict[Source, int]) -> NoReturn:
+        if len(counts) == 1:
             self._raise(
                 f"{contradiction}, and nothing tells their messages apart; record one publisher alone, or take the log "
-                f"as it is with --publisher {numbers[table.sources[0]]}"
+                f"as it is with --publisher {numbers[next(iter(counts))]}"
             )
-        counts = dict(zip(table.sources, np.bincount(table.owner, minlength=len(table.sources)).tolist(), strict=True))
         self._raise(f"{contradiction}; choose one with --publisher: {describe(numbers, counts)}")
 
     def _ignored(self, series: JointSeries) -> list[str]:
@@ -162,18 +176,20 @@ class JointReader:
 
     def _recording(self, topic: str, names: tuple[str, ...], samples: Samples, notes: list[str]) -> Recording:
         stamps = samples.stamps
-        if len(stamps) < 2:
-            what = "header stamp" if self.options.time == "header" else "log time"
-            advice = "; take the times of the recorder: --time log" if self.options.time == "header" else ""
-            count = samples.repeated + len(stamps)
-            self._raise(f"all {count} messages have the same {what}; a log needs times that advance{advice}")
-        if samples.repeated:
-            notes.append(f"{samples.repeated} messages repeated the time before and were left out")
+        notes = notes + self._repeated(len(stamps), samples.repeated)
         q, *others = samples.values
         dq, effort = (None if np.isnan(part).all() else part for part in others)
         return Recording(
             self.path.stem, topic, self.options.time, names, stamps, q, dq, effort, samples.repeated, tuple(notes)
         )
+
+    def _repeated(self, count: int, repeated: int) -> list[str]:
+        """A note on times that were there already; an error if there is only one time."""
+        if count < 2:
+            what = "header stamp" if self.options.time == "header" else "log time"
+            advice = "; take the times of the recorder: --time log" if self.options.time == "header" else ""
+            self._raise(f"all {repeated + count} messages have the same {what}; a log needs times that advance{advice}")
+        return [f"{repeated} messages repeated the time before and were left out"] if repeated else []
 
     def _raise(self, message: str) -> NoReturn:
         damage = self._losses(self.options.topic)

@@ -64,6 +64,7 @@ class JointSeries:
         self.original: dict[str, None] = {}
         self._sources: dict[Source, tuple[Source, list[int]]] = {}
         self._begins: dict[Source, int] = {}
+        self._counts: dict[Source, int] = {}
         self._parts: dict[Source, list[tuple[Indices, Stamps, Stamps, Array]]] = {}
 
     def add(self, batch: Batch) -> None:
@@ -74,6 +75,11 @@ class JointSeries:
             self.others += len(batch.order)
             return
         values = batch.values if len(columns) == len(batch.source.names) else batch.values[:, :, columns]
+        self._counts[source] = self._counts.get(source, 0) + len(batch.order)
+        self._store(source, batch, values)
+
+    def _store(self, source: Source, batch: Batch, values: Array) -> None:
+        """Keep the messages of a batch; ``values`` are those of the joints that are wanted."""
         self._parts.setdefault(source, []).append((batch.order, batch.stamps, batch.log_times, values))
 
     @property
@@ -84,8 +90,7 @@ class JointSeries:
     @property
     def counts(self) -> dict[Source, int]:
         """Messages of each source that is about wanted joints, in the order in which they begin."""
-        kept = [source for source in self.numbers if source in self._parts]
-        return {source: sum(len(part[0]) for part in self._parts[source]) for source in kept}
+        return {source: self._counts[source] for source in self.numbers if source in self._counts}
 
     def _source(self, raw: Source) -> tuple[Source, list[int]]:
         """Rename the joints of a source; and the columns that are kept of it."""
@@ -114,7 +119,8 @@ class JointSeries:
 
     def keep(self, source: Source) -> None:
         """Give up all other sources."""
-        self._parts = {source: self._parts[source]}
+        self._counts = {source: self._counts[source]}
+        self._parts = {key: parts for key, parts in self._parts.items() if key == source}
 
     def table(self, names: Sequence[str]) -> JointTable:
         """Merge what came from all sources; what was collected is given up."""

@@ -98,6 +98,11 @@ class JointTopics:
                 int(np.count_nonzero(block.channels == k)) for k in present if k not in self.file.channels
             )
 
+    @property
+    def seen(self) -> int:
+        """Messages of all kinds in the blocks that were begun; it changes when the block of a batch does."""
+        return self._count
+
     def _channel(self, number: int, block: Block) -> JointChannel | None:
         """Find the channel of this number, if it carries joint states on a topic that is wanted."""
         if number not in self._seen and number in self.file.channels:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modrob_cli.arrays import Indices
 from modrob_cli.io.cdr_layout import Stamps
@@ -22,6 +23,9 @@ MESSAGE_HEAD = struct.Struct("<HIQQ")
 """Channel, sequence, log time, publish time."""
 
 _PIECE = 2**22
+_MOST_ALIKE = 4096
+"""Records that are taken at once."""
+_HEAD_TYPE = np.dtype([("channel", "<u2"), ("sequence", "<u4"), ("log", "<u8"), ("publish", "<u8")])
 
 
 class Opcode(IntEnum):
@@ -223,6 +227,7 @@ class BlockBuilder:
 
     def __init__(self) -> None:
         self._rows: list[tuple[int, int, int, int]] = []
+        self._tables: list[NDArray[np.int64]] = []  # of what came before the rows
 
     def add(self, data: bytes, place: int, length: int, base: int = 0) -> None:
         """Take the Message record at ``place``; the memory begins ``base`` bytes before ``data``."""
@@ -233,7 +238,43 @@ class BlockBuilder:
             raise DamageError("a log time is out of range")
         self._rows.append((channel, base + place + MESSAGE_HEAD.size, length - MESSAGE_HEAD.size, log_time))
 
+    def add_alike(self, data: bytes, place: int, length: int) -> int:
+        """Take the Message record at ``place`` and those behind it of the same length; returns the place behind them.
+
+        A topic of joint states fills whole chunks with such records, so they are compared and taken many at a time.
+        """
+        self.add(data, place, length)
+        head, size, count = data[place - HEAD.size : place], HEAD.size + length, 1
+        place += length
+        while data[place : place + HEAD.size] == head and (most := (len(data) - place) // size) > 0:
+            count = min(2 * count, _MOST_ALIKE, most)  # doubled, so that few are looked at in vain
+            records = np.frombuffer(data, np.uint8, count * size, place).reshape(count, size)
+            alike = (records[:, : HEAD.size] == records[0, : HEAD.size]).all(axis=1)
+            found = count if alike.all() else int(np.argmin(alike))
+            heads = records[:found, HEAD.size : HEAD.size + MESSAGE_HEAD.size].copy().view(_HEAD_TYPE)[:, 0]
+            if np.any(heads["log"] >= 2**63):
+                return self._add_until_damage(data, place, length)
+            table = np.empty((found, 4), dtype=np.int64)
+            table[:, 0], table[:, 2], table[:, 3] = heads["channel"], length - MESSAGE_HEAD.size, heads["log"]
+            table[:, 1] = place + HEAD.size + MESSAGE_HEAD.size + size * np.arange(found)
+            self._close_rows()
+            self._tables.append(table)
+            place += found * size
+        return place
+
+    def _add_until_damage(self, data: bytes, place: int, length: int) -> int:
+        """Take records one by one; one of them raises an error."""
+        while True:
+            self.add(data, place + HEAD.size, length)
+            place += HEAD.size + length
+
+    def _close_rows(self) -> None:
+        if self._rows:
+            self._tables.append(np.array(self._rows, dtype=np.int64))
+            self._rows = []
+
     def build(self, data: bytes) -> Block:
         """Messages in ``data`` that were added."""
-        table = np.array(self._rows, dtype=np.int64).reshape(-1, 4)
+        self._close_rows()
+        table = np.concatenate([np.empty((0, 4), dtype=np.int64), *self._tables])
         return Block(data, *(np.ascontiguousarray(column) for column in table.T))

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from modrob_cli.arrays import Array
-from modrob_cli.errors import Fault, InputFileError
 from modrob_cli.io.joint_reader import JointReader
+from modrob_cli.io.log_completeness import Completeness
 from modrob_cli.io.log_csv import read_log_csv
 from modrob_cli.io.log_options import LogOptions
 from modrob_cli.model.log import JointLog, Recording
@@ -38,7 +37,7 @@ def read_joint_log(
     """
     options = options or LogOptions()
     recording = read_recording(path, joint_names, replace(options, topic=topic or options.topic))
-    return _complete(path, recording)
+    return complete_log(path, recording)
 
 
 def read_recording(
@@ -54,32 +53,21 @@ def read_recording(
     return JointReader(path, joint_names, options).read()
 
 
-def _complete(path: Path, recording: Recording) -> JointLog:
-    """Leave out samples without position or effort, and velocities if some are missing."""
-    notes = list(recording.notes)
-    if recording.effort is None:
-        raise _fault(path, f"found no effort of {', '.join(recording.joint_names)}; a log needs effort")
-    for what, values in (("position", recording.q), ("effort", recording.effort)):
-        empty = np.asarray(~np.isfinite(values).any(axis=0))
-        if empty.any():
-            names = ", ".join(name for name, bad in zip(recording.joint_names, empty, strict=True) if bad)
-            raise _fault(path, f"found no {what} of {names}; a log needs positions and efforts of all joints")
-    good = np.asarray(np.isfinite(recording.q).all(axis=1) & np.isfinite(recording.effort).all(axis=1))
-    if not good.all():
-        notes.append(f"{np.count_nonzero(~good)} of {len(good)} samples lack a position or an effort and were left out")
-    if np.count_nonzero(good) < 2:
-        raise _fault(path, f"found {np.count_nonzero(good)} samples with all positions and efforts, expected 2 or more")
+def complete_log(path: Path, recording: Recording) -> JointLog:
+    """Leave out samples without position or effort, and velocities if some are missing.
+
+    Raises
+    ------
+    InputFileError
+        If too little is left.
+    """
+    found = Completeness(len(recording.joint_names))
+    good = found.add(recording.q, recording.dq, recording.effort)
+    notes = (*recording.notes, *found.notes(path, recording.joint_names))
     kept = slice(None) if good.all() else np.flatnonzero(good)  # a slice does not copy
-    dq = recording.dq[kept] if recording.dq is not None else None
-    if dq is not None and not np.isfinite(dq).all():
-        bad = np.count_nonzero(~np.isfinite(dq).all(axis=1))
-        notes.append(f"velocities are missing in {bad} of {len(dq)} samples and count as not recorded")
-        dq = None
+    dq = recording.dq[kept] if recording.dq is not None and found.has_velocity else None
+    effort = np.asarray(recording.effort)[kept]  # there are efforts: without any, there is an error by now
     stamps = recording.stamps[kept]
     t = (stamps - stamps[0]) / 1e9
-    arrays: tuple[Array, Array | None, Array] = (recording.q[kept], dq, recording.effort[kept])
-    return JointLog(recording.name, recording.joint_names, t, *arrays, recording.repeated, tuple(notes))
-
-
-def _fault(path: Path, message: str) -> InputFileError:
-    return InputFileError(Fault(str(path), message))
+    arrays = (recording.q[kept], dq, effort)
+    return JointLog(recording.name, recording.joint_names, t, *arrays, recording.repeated, notes, int(stamps[0]))

@@ -210,8 +210,9 @@ class Walk:
                 if length > end - place:
                     raise DamageError("a record of a chunk is too long")
                 if opcode == Opcode.MESSAGE:
-                    builder.add(data, place, length)
-                elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                    place = builder.add_alike(data, place, length)
+                    continue
+                if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                     self._define(opcode, data[place : place + length])
                 place += length
         except DamageError as error:

@@ -1,7 +1,7 @@
 """MCAP files as rosbag2 writes them: ROS 2 messages in CDR, chunks packed with zstd, indexes, checksums.
 
 Records of messages are made by columns, a chunk at a time, so that memory does not grow with their number beyond that
-of the values. The same input gives the same bytes.
+of the values, or of one piece of them. The same input gives the same bytes.
 """
 
 import struct
@@ -9,13 +9,14 @@ import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from types import TracebackType
+from typing import Any, BinaryIO, Self
 
 import numpy as np
 
 from modrob_cli import __version__
 from modrob_cli.arrays import Array, Indices
-from modrob_cli.errors import ShapeError, UsageError
+from modrob_cli.errors import OutputError, ShapeError
 from modrob_cli.io.cdr_layout import MessageLayout, Stamps, split_rows
 
 _MAGIC = b"\x89MCAP0\r\n"
@@ -54,8 +55,8 @@ class Series:
         if np.any(np.diff(self.stamps) < 0):
             raise ShapeError(f"{self.topic}: the stamps decrease")
 
-    def records(self, channel: int, first: int, last: int) -> list[bytes]:
-        """Records of the messages first .. last - 1."""
+    def records(self, channel: int, first: int, last: int, sent: int = 0) -> list[bytes]:
+        """Records of the messages first .. last - 1; ``sent`` messages of the topic went before this series."""
         if first == last:
             return []
         span = slice(first, last)
@@ -63,7 +64,7 @@ class Series:
         head = np.empty((last - first, 1), dtype=_MESSAGE)
         head["opcode"], head["channel"] = 0x05, channel
         head["length"] = _MESSAGE.itemsize - 9 + data.shape[1]
-        head["sequence"][:, 0] = np.arange(first, last)
+        head["sequence"][:, 0] = np.arange(sent + first, sent + last)
         head["log"][:, 0] = head["publish"][:, 0] = self.stamps[span]
         return split_rows(np.hstack([head.view(np.uint8), data]))
 
@@ -82,55 +83,127 @@ def write_mcap(path: Path, series: Sequence[Series], metadata: Mapping[str, Mapp
         If two series have one topic.
     NumericalError
         If a stamp is out of range.
-    UsageError
+    OutputError
         If the file cannot be written.
     """
-    if len({one.topic for one in series}) != len(series):
-        raise ShapeError("expected one series for each topic")
     try:
-        with path.open("wb") as stream:
-            _File(stream).write(series, metadata or {})
+        with McapWriter(path, [(one.topic, one.layout) for one in series], metadata) as writer:
+            writer.add(series)
     except OSError as error:
-        raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
+        raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
 
 
-@dataclass
+class McapWriter:
+    """A file that is written piece by piece; a context manager. Errors of the disk are raised as they are.
+
+    Parameters
+    ----------
+    topics : topic and layout of each series, in the order in which the pieces have them
+    metadata : as for :func:`write_mcap`
+
+    Raises
+    ------
+    ShapeError
+        If two series have one topic.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        topics: Sequence[tuple[str, MessageLayout]],
+        metadata: Mapping[str, Mapping[str, str]] | None = None,
+    ) -> None:
+        if len({topic for topic, _ in topics}) != len(topics):
+            raise ShapeError("expected one series for each topic")
+        self._path, self._topics, self._metadata = path, topics, metadata or {}
+
+    def __enter__(self) -> Self:
+        """Open the file."""
+        stream = self._path.open("wb")
+        try:
+            self._file = _File(stream, self._topics)
+        except BaseException:
+            stream.close()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Write the summary, unless there was an error, and close the file."""
+        with self._file.stream:
+            if kind is None:
+                self._file.finish(self._metadata)
+
+    def add(self, series: Sequence[Series]) -> None:
+        """Write the next messages, merged in the order of their times; none may be before those of an earlier piece.
+
+        Raises
+        ------
+        ShapeError
+            If the topics are others, or times go back.
+        NumericalError
+            If a stamp is out of range.
+        """
+        self._file.add(series)
+
+
 class _File:
     """A file that is being written."""
 
-    stream: BinaryIO
+    def __init__(self, stream: BinaryIO, topics: Sequence[tuple[str, MessageLayout]]) -> None:
+        from mcap.records import Channel, Header, Schema
 
-    def write(self, series: Sequence[Series], metadata: Mapping[str, Mapping[str, str]]) -> None:
-        from mcap.records import Channel, DataEnd, Header, Metadata, MetadataIndex, Schema, Statistics
-
-        self.stream.write(_MAGIC)
-        self._put(Header(profile="ros2", library=f"modrob {__version__}"))
-        kinds = {one.layout.type_name: one.layout.definition for one in series}
+        self.stream = stream
+        self._topics = [topic for topic, _ in topics]
+        self._sent = [0] * len(topics)
+        self._first: int | None = None
+        self._last = 0
+        self._chunks: list[Any] = []
+        kinds = {layout.type_name: layout.definition for _, layout in topics}
         ids = {name: k for k, name in enumerate(kinds, start=1)}
-        schemas = [Schema(id=ids[name], name=name, encoding="ros2msg", data=kinds[name].encode()) for name in kinds]
-        channels = [
+        self._schemas = [
+            Schema(id=ids[name], name=name, encoding="ros2msg", data=kinds[name].encode()) for name in kinds
+        ]
+        self._channels = [
             Channel(
-                id=k, topic=one.topic, message_encoding="cdr", metadata={"offered_qos_profiles": ""},
-                schema_id=ids[one.layout.type_name],
+                id=k, topic=topic, message_encoding="cdr", metadata={"offered_qos_profiles": ""},
+                schema_id=ids[layout.type_name],
             )
-            for k, one in enumerate(series, start=1)
+            for k, (topic, layout) in enumerate(topics, start=1)
         ]  # fmt: skip
-        for record in (*schemas, *channels):
+        stream.write(_MAGIC)
+        for record in (Header(profile="ros2", library=f"modrob {__version__}"), *self._schemas, *self._channels):
             self._put(record)
-        chunks = [self._put_chunk(series, spans) for spans in _chunks(series)]
+
+    def add(self, series: Sequence[Series]) -> None:
+        if [one.topic for one in series] != self._topics:
+            raise ShapeError(f"expected series of the topics {', '.join(self._topics)}")
+        ends = [int(one.stamps[k]) for one in series if len(one.stamps) for k in (0, -1)]
+        if not ends:
+            return
+        if self._first is not None and min(ends) < self._last:
+            raise ShapeError("a piece begins before the one before it ends")
+        self._chunks += [self._put_chunk(series, spans) for spans in _chunks(series)]
+        self._first = min(ends) if self._first is None else self._first
+        self._last = max(ends)
+        self._sent = [sent + len(one.stamps) for sent, one in zip(self._sent, series, strict=True)]
+
+    def finish(self, metadata: Mapping[str, Mapping[str, str]]) -> None:
+        from mcap.records import DataEnd, Metadata, MetadataIndex, Statistics
+
         places = []
         for name, texts in metadata.items():
             offset, length = self._put(Metadata(name=name, metadata=dict(texts)))
             places.append(MetadataIndex(offset=offset, length=length, name=name))
         self._put(DataEnd(data_section_crc=0))
-        counts = {k: len(one.stamps) for k, one in enumerate(series, start=1) if len(one.stamps)}
+        counts = {k: sent for k, sent in enumerate(self._sent, start=1) if sent}
         statistics = Statistics(
-            message_count=sum(counts.values()), channel_message_counts=counts, schema_count=len(schemas),
-            channel_count=len(channels), chunk_count=len(chunks), metadata_count=len(places), attachment_count=0,
-            message_start_time=min((int(one.stamps[0]) for one in series if len(one.stamps)), default=0),
-            message_end_time=max((int(one.stamps[-1]) for one in series if len(one.stamps)), default=0),
+            message_count=sum(counts.values()), channel_message_counts=counts, schema_count=len(self._schemas),
+            channel_count=len(self._channels), chunk_count=len(self._chunks), metadata_count=len(places),
+            attachment_count=0, message_start_time=self._first or 0, message_end_time=self._last,
         )  # fmt: skip
-        self._finish([schemas, channels, [statistics], chunks, places])
+        self._finish([self._schemas, self._channels, [statistics], self._chunks, places])
 
     def _put(self, record: Any) -> tuple[int, int]:
         """Write a record; returns its place and length."""
@@ -143,7 +216,8 @@ class _File:
         import zstandard
         from mcap.records import Chunk, ChunkIndex
 
-        parts = [one.records(k, *span) for k, (one, span) in enumerate(zip(series, spans, strict=True), start=1)]
+        whole = zip(series, spans, self._sent, strict=True)
+        parts = [one.records(k, *span, sent) for k, (one, span, sent) in enumerate(whole, start=1)]
         stamps = [one.stamps[first:last] for one, (first, last) in zip(series, spans, strict=True)]
         records = [record for part in parts for record in part]
         order = np.argsort(np.concatenate(stamps), kind="stable")

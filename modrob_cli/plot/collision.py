@@ -29,6 +29,7 @@ class CollisionPicture:
     legends : of the measurement, the band and the wider band
     events : start, end and index of the joint
     contacts : start and end of known contacts
+    outside : per joint, times and values of samples outside the band, shape (K, 2)
     """
 
     title: str
@@ -43,6 +44,7 @@ class CollisionPicture:
     legends: tuple[str, str, str]
     events: Sequence[tuple[float, float, int]] = ()
     contacts: Sequence[tuple[float, float]] = ()
+    outside: Sequence[Array] = ()
 
 
 def draw_collision(picture: CollisionPicture, path: Path) -> None:
@@ -85,11 +87,9 @@ def _draw_joint(axis: Any, picture: CollisionPicture, j: int, points: int) -> No
         _band(axis, t, picture.wider[0][:, j], picture.wider[1][:, j], WIDER, points)
     _band(axis, t, picture.lower[:, j], picture.upper[:, j], BAND, points)
     if picture.measured is not None:
-        measured = picture.measured[:, j]
-        axis.plot(*thin(t, measured, points), color=INK, linewidth=0.7, zorder=4)
-        beyond = (measured > picture.upper[:, j]) | (measured < picture.lower[:, j])
-        if beyond.any():
-            axis.plot(t[beyond], measured[beyond], ".", color=EVENT, markersize=2.2, zorder=5, rasterized=True)
+        axis.plot(*thin(t, picture.measured[:, j], points), color=INK, linewidth=0.7, zorder=4)
+    if picture.outside and len(picture.outside[j]):
+        axis.plot(*picture.outside[j].T, ".", color=EVENT, markersize=2.2, zorder=5, rasterized=True)
     for start, end, joint in picture.events:
         if joint == j:
             axis.axvspan(start, max(end, start + 2e-3 * (t[-1] - t[0])), color=EVENT, alpha=0.2, zorder=1, linewidth=0)

@@ -1,10 +1,37 @@
 """What a report is made of, before it has a form."""
 
+import os
 from dataclasses import dataclass, field
 from typing import Literal
+from urllib.parse import quote
 
-Cell = str | float | int | None
 Tone = Literal["good", "bad", "open", "plain"]
+
+
+@dataclass(frozen=True)
+class Link:
+    """Text that leads to a file beside the page.
+
+    Attributes
+    ----------
+    href : name of the file. It is percent-encoded whole, colons too, so that no name can be taken for another site or
+        for a script: ``javascript:x`` leads to a file of that name
+    """
+
+    text: str
+    href: str
+
+    def __post_init__(self) -> None:
+        if self.href in ("", ".", "..") or "/" in self.href or "\0" in self.href:
+            raise ValueError(f"found a link to {self.href!r}, expected the name of a file beside the page")
+
+    @property
+    def address(self) -> str:
+        """What goes into the page; it holds letters, digits and ``%-._~`` only."""
+        return quote(os.fsencode(self.href), safe="")
+
+
+Cell = str | float | int | Link | None
 
 
 @dataclass(frozen=True)
@@ -67,11 +94,17 @@ Block = Table | Picture | Text | Notes
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and what is under it; a folded one shows its blocks on request and on paper."""
+    """A heading and what is under it; a folded one shows its blocks on request and on paper.
+
+    Attributes
+    ----------
+    on_paper : false for what nobody prints, such as a table of a thousand logs
+    """
 
     title: str
     blocks: tuple[Block, ...]
     folded: bool = False
+    on_paper: bool = True
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,10 @@
 """Reports as HTML."""
 
-from modrob_cli.report.document import Cell, Report
+from modrob_cli.report.document import Cell, Link, Report, Table
 
 _PLACES = 4
+_SHORT = 24
+"""Letters of a text that stays on one line in a table."""
 
 
 def render(report: Report) -> str:
@@ -18,8 +20,13 @@ def render(report: Report) -> str:
     environment.lstrip_blocks = True
     environment.filters["cell"] = cell_text
     environment.filters["kind"] = lambda block: type(block).__name__
+    environment.tests["link"] = lambda value: isinstance(value, Link)
+    environment.tests["long"] = lambda value: isinstance(value, str | Link) and len(cell_text(value)) > _SHORT
+    environment.filters["texts"] = text_columns
     environment.filters["drawing"] = lambda svg: Markup(svg[svg.index("<svg") :])  # without the XML declaration
-    return environment.get_template("report.html.j2").render(report=report)
+    page = environment.get_template("report.html.j2").render(report=report)
+    # Names of files may hold bytes that are no UTF-8.
+    return page.encode(errors="backslashreplace").decode()
 
 
 def cell_text(value: Cell) -> str:
@@ -28,6 +35,15 @@ def cell_text(value: Cell) -> str:
         return "–"
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, Link):
+        return value.text
     if isinstance(value, float):
         return f"{value:.{_PLACES}g}"
     return str(value)
+
+
+def text_columns(table: Table) -> list[bool]:
+    """By column, whether its first value that is there is text: those stand to the left, numbers to the right."""
+    columns = zip(*table.rows, strict=True) if table.rows else [()] * len(table.header)
+    firsts = [next((value for value in column if value is not None), None) for column in columns]
+    return [isinstance(value, str | Link) for value in firsts]

@@ -27,7 +27,7 @@ def input_hashes(files: Sequence[Path]) -> dict[str, str]:
 def skipped_entries(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
     """Logs without a result: path, reason, and the exit code that it stands for."""
     return [
-        {"log": outcome.job.source, "reason": outcome.failure.reason, "code": outcome.failure.code}
+        {"log": outcome.job.label, "reason": outcome.failure.reason, "code": outcome.failure.code}
         for outcome in outcomes
         if outcome.failure is not None
     ]
@@ -36,11 +36,11 @@ def skipped_entries(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
 def overall_provenance(inputs: dict[str, str], outcomes: Sequence[Outcome]) -> dict[str, Any]:
     """Version, and the hash of each input: logs by name, or as given where two share one."""
     done = [outcome for outcome in outcomes if outcome.record is not None]
-    names = Counter([*inputs, *(Path(outcome.job.source).name for outcome in done)])
+    names = Counter([*inputs, *(outcome.job.file for outcome in done)])
     logs = {}
     for outcome in done:
-        name = Path(outcome.job.source).name
-        logs[name if names[name] == 1 else outcome.job.source] = outcome.done["provenance"]["log"]
+        name = outcome.job.file
+        logs[name if names[name] == 1 else outcome.job.label] = outcome.done["provenance"]["log"]
     return {"modrob": __version__, "inputs": {**inputs, **dict(sorted(logs.items()))}}
 
 

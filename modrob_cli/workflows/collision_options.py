@@ -109,6 +109,8 @@ class CollisionOptions:
             raise UsageError(f"--rate: found {self.rate:g}, expected a number > 0 [Hz]")
         self.radii(robot)
         self.link_points(robot)
+        if source == "measured":
+            self.velocity_knowledge(robot)
 
     @property
     def rules(self) -> Rules:

@@ -8,13 +8,15 @@ import numpy as np
 from modrob_cli.arrays import Array
 from modrob_cli.collision.events import Event
 from modrob_cli.collision.sensitivity import AXES, ContactForces
-from modrob_cli.collision.tables import UPPER, PhaseTable
+from modrob_cli.collision.tables import UPPER
 from modrob_cli.identify.effort import effort_factors
 from modrob_cli.io.csv_writer import csv_text
 from modrob_cli.model.robot import Robot
 from modrob_cli.workflows.bounds_summary import unit
-from modrob_cli.workflows.collision_judge import JudgedRun, Learned, Method
+from modrob_cli.workflows.collision_banding import Learned
+from modrob_cli.workflows.collision_judge import JudgedRun, Method
 from modrob_cli.workflows.collision_options import CollisionOptions
+from modrob_cli.workflows.log_date import log_date
 
 METHODS = {
     "bands": "bands of this report",
@@ -39,22 +41,24 @@ def effort_unit(robot: Robot, j: int, options: CollisionOptions) -> str:
 
 def log_result(judged: JudgedRun, options: CollisionOptions) -> dict[str, Any]:
     """One log or planned motion."""
-    run = judged.run
-    robot, t = run.robot, run.motion.t
+    about, survey = judged.about, judged.survey
+    robot = about.robot
     events = judged.methods[0].events if judged.methods else []
-    contacts = run.contacts
+    contacts, planned = about.contacts, about.tau is None
     return {
-        "log": run.name,
-        "planned": run.tau is None,
-        "duration": float(t[-1] - t[0]),
-        "samples": len(t),
-        "samples_used": int(np.count_nonzero(run.used)),
-        "rate": run.motion.rate,
-        "acceleration": run.source,
-        "ddq_tolerance": [float(value) for value in np.atleast_2d(run.motion.ddq_rad).max(axis=0)],
+        "log": about.name,
+        "date": None if planned else log_date(about.start),
+        "planned": planned,
+        "duration": survey.end - survey.start,
+        "samples": survey.samples,
+        "samples_used": survey.used,
+        "rate": about.motion.rate,
+        "acceleration": about.source,
+        "ddq_tolerance": survey.most_rad.tolist(),
         "filter_gain": judged.filter.gain,
-        "notes": [*run.notes, *_without_width(judged)],
+        "notes": [*about.notes, *_without_width(judged)],
         "events": [event_json(robot, event, options) for event in events],
+        "closest": _closest_json(judged),
         "contacts": None if contacts is None else [_contact_json(judged, k) for k in range(len(contacts))],
         "methods": [_method_json(method, contacts is None) for method in judged.methods],
         "sensitivity": [_sensitivity(judged, j) for j in range(robot.dof)],
@@ -62,15 +66,27 @@ def log_result(judged: JudgedRun, options: CollisionOptions) -> dict[str, Any]:
             {"point": point.label, **_forces_json(forces)}
             for point, forces in zip(options.link_points(robot), judged.forces, strict=True)
         ],
+        "thresholds": {
+            phase: {"samples": table.samples, "torque": table.torque.tolist(), "force": table.force.tolist()}
+            for phase, table in (("acceleration", judged.table.acceleration), ("nominal", judged.table.nominal))
+        },
     }
 
 
 def _without_width(judged: JudgedRun) -> list[str]:
     """A warning where nothing is uncertain, because no real arm is known that well."""
-    thin = np.median(judged.width, axis=0) < 1e-6
-    names = [name for name, bare in zip(judged.run.robot.joint_names, thin, strict=True) if bare]
+    thin = judged.widths.median < 1e-6
+    names = [name for name, bare in zip(judged.about.robot.joint_names, thin, strict=True) if bare]
     told = "nothing is uncertain and no noise was stated: the band is the allowance for rounding"
     return [f"{', '.join(names)}: {told}"] if names else []
+
+
+def _closest_json(judged: JudgedRun) -> list[dict[str, Any]] | None:
+    """How near each joint came to an end of its band: 0 in its middle, 1 at its end, more outside."""
+    if judged.closest is None:
+        return None
+    found = zip(judged.about.robot.joint_names, judged.closest.share, judged.closest.time, strict=True)
+    return [{"joint": name, "share": float(share), "time": float(time)} for name, share, time in found]
 
 
 def event_json(robot: Robot, event: Event, options: CollisionOptions) -> dict[str, Any]:
@@ -91,7 +107,7 @@ def event_json(robot: Robot, event: Event, options: CollisionOptions) -> dict[st
 
 
 def _contact_json(judged: JudgedRun, k: int) -> dict[str, Any]:
-    contact = (judged.run.contacts or ())[k]
+    contact = (judged.about.contacts or ())[k]
     delays = {method.name: method.score.delays[k] for method in judged.methods}
     return {"name": contact.name, "start": contact.start, "end": contact.end, "delays": delays}
 
@@ -112,15 +128,14 @@ def _method_json(method: Method, unlabelled: bool) -> dict[str, Any]:
 
 
 def _sensitivity(judged: JudgedRun, j: int) -> dict[str, Any]:
-    width = judged.counted[:, j] if len(judged.counted) else judged.width[:, j]
-    other = None if judged.other_width is None else judged.other_width[:, j]
+    robot, widths = judged.about.robot, judged.widths
     return {
-        "joint": judged.run.robot.joint_names[j],
-        "unit": unit(judged.run.robot, j),
-        "min_detectable": float(width.max()),
-        "median": float(np.median(width)),
-        "least": float(width.min()),
-        "other_band_ratio": None if other is None else float(np.median(other / np.maximum(judged.width[:, j], 1e-300))),
+        "joint": robot.joint_names[j],
+        "unit": unit(robot, j),
+        "min_detectable": float(widths.most[j]),
+        "median": float(widths.median[j]),
+        "least": float(widths.least[j]),
+        "other_band_ratio": None if widths.other_ratio is None else float(widths.other_ratio[j]),
         "shares": [{"parameter": share.parameter, "share": share.share} for share in judged.shares[j][:5]],
     }
 
@@ -149,16 +164,12 @@ def learned_json(robot: Robot, learned: Learned | None, options: CollisionOption
     }
 
 
-def threshold_document(robot: Robot, judged: Sequence[JudgedRun], options: CollisionOptions) -> dict[str, Any]:
+def threshold_document(robot: Robot, results: Sequence[dict[str, Any]], options: CollisionOptions) -> dict[str, Any]:
     """Constant thresholds over all logs in the shape of franka_msgs/srv/SetFullCollisionBehavior."""
-    phases: dict[str, list[PhaseTable]] = {
-        "acceleration": [one.table.acceleration for one in judged],
-        "nominal": [one.table.nominal for one in judged],
-    }
     request: dict[str, list[float]] = {}
     for kind in ("torque", "force"):
-        for phase, tables in phases.items():
-            most = np.max([getattr(table, kind) for table in tables], axis=0)
+        for phase in ("acceleration", "nominal"):
+            most = np.max([result["thresholds"][phase][kind] for result in results], axis=0)
             request[f"lower_{kind}_thresholds_{phase}"] = _rounded_up(most)
             request[f"upper_{kind}_thresholds_{phase}"] = _rounded_up(UPPER * most)
     return {
@@ -167,7 +178,7 @@ def threshold_document(robot: Robot, judged: Sequence[JudgedRun], options: Colli
         "passes it without contact; upper: twice that; force: of the wrench pinv(J') residual at the end effector, in "
         "the base frame",
         "filter": str(options.filter),
-        "motions": [one.run.name for one in judged],
+        "motions": [result["log"] for result in results],
         "joints": list(robot.joint_names),
         "units": {"torque": [unit(robot, j) for j in range(robot.dof)], "force": ["N"] * 3 + ["N m"] * 3},
         "service": "franka_msgs/srv/SetFullCollisionBehavior",

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,7 +35,7 @@ def identify_bounds(
     options: BoundedOptions,
     folder: OutputFolder,
     held_out: Sequence[Run] = (),
-    inputs: Sequence[Path] = (),
+    made_from: dict[str, Any] | None = None,
     used: Sequence[UsedLog] = (),
 ) -> dict[str, Any]:
     """Find the smallest intervals of friction, rotor and disturbance that put every sample inside the torque bounds.
@@ -46,7 +45,7 @@ def identify_bounds(
     runs : contact-free; their used samples count
     folder : open; all files go there
     held_out : runs that the intervals are not found from; how many of their samples lie inside is reported
-    inputs : log files, for the record of what the outputs were made from
+    made_from : provenance of the outputs; None for the robot alone
     used : stretches of them that ``runs`` cover, for the robot file
 
     Returns
@@ -80,7 +79,7 @@ def identify_bounds(
         "held_out": held_out_result(search.written, held_out, options.torque == "filtered", noise),
         "growth": growth_result(arm, motion, noise, samples, found, options) if options.growth else None,
         "overlay": write_overlay(robot, search.written, folder, names["overlay"], names["assembly"]),
-        "provenance": provenance([*robot.files, *inputs]),
+        "provenance": made_from or provenance(robot.files),
     }
     if result["overlay"] is None:
         names = {kind: name for kind, name in names.items() if kind not in ("overlay", "assembly")}
@@ -122,6 +121,11 @@ def _search(
     data = robot_data(bounded_robot(arm, found, bands), source=f"modrob identify --bounds, from {robot.files[0].name}")
     written = RobotDocument.model_validate(data).to_model()
     return _Search(samples, found, data, written, motion.bounds(written, noise))
+
+
+def bounded_names(arm: Robot) -> list[str]:
+    """Names of the files and folders that may be written."""
+    return list(_names(arm).values())
 
 
 def _names(arm: Robot) -> dict[str, str]:

@@ -1,6 +1,6 @@
 """The regression over all joints, its errors, and its judgement."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,13 +9,13 @@ from modrob_cli.arrays import Array
 from modrob_cli.dynamics.newton_euler import rnea
 from modrob_cli.errors import NumericalError
 from modrob_cli.identify.friction_diagnosis import Coupling, GravityShare, coupling, gravity_share
-from modrob_cli.identify.prediction_pooled import PooledError, pooled_errors
+from modrob_cli.identify.prediction_pooled import PooledError, error_sums, errors_of
 from modrob_cli.identify.regression import JointPrior, RegressionOptions, fit_joint
 from modrob_cli.identify.regression_result import JointEstimate
 from modrob_cli.identify.regression_rows import joint_motion
 from modrob_cli.identify.run import Run
 from modrob_cli.model.robot import Robot
-from modrob_cli.workflows.identify_runs import LogRun
+from modrob_cli.workflows.identify_runs import Parts
 
 UNEXPLAINED = 0.5
 """NRMSE (low-passed) from which on a joint counts as unexplained: a model that misses half of the torque."""
@@ -32,6 +32,7 @@ class Fitted:
     ----------
     estimates : one per joint
     train, test : errors per joint on the fitted and on the held-out part; ``test`` is None without such a part
+    logs : errors per joint on each log, on its held-out part if it has one; None where nothing of it counts
     couplings : another joint that explains what is left, per joint
     gravity : share of the model's gravity in the record; None where gravity hardly matters
     """
@@ -39,6 +40,7 @@ class Fitted:
     estimates: list[JointEstimate]
     train: list[PooledError] | None
     test: list[PooledError] | None
+    logs: list[list[PooledError] | None]
     couplings: list[Coupling | None]
     gravity: GravityShare | None
 
@@ -57,8 +59,19 @@ class Fitted:
         return found
 
 
-def fit_all(robot: Robot, runs: Sequence[LogRun], options: RegressionOptions, diagnose: bool = True) -> Fitted:
+def fit_all(
+    robot: Robot,
+    runs: Sequence[Parts],
+    options: RegressionOptions,
+    diagnose: bool = True,
+    stage: Callable[[str, float], None] | None = None,
+) -> Fitted:
     """Fit every joint to the training parts, predict both parts.
+
+    Parameters
+    ----------
+    diagnose : also look for what the fit does not explain
+    stage : told what is done, and which part of all is done
 
     Raises
     ------
@@ -66,19 +79,40 @@ def fit_all(robot: Robot, runs: Sequence[LogRun], options: RegressionOptions, di
         If too few samples are left.
     """
     train, test = [item.train for item in runs], [item.test for item in runs]
+    tell = stage or (lambda what, fraction: None)
     inertia = rigid_inertia(robot, train)
     priors = [JointPrior(_held(robot, j), inertia[j]) for j in range(robot.dof)]
-    estimates = [fit_joint(train, j, options, priors[j]) for j in range(robot.dof)]
+    estimates = []
+    for j, joint in enumerate(robot.joints):
+        tell(f"fitting {joint.name}", 0.5 * j / robot.dof)
+        estimates.append(fit_joint(train, j, options, priors[j]))
     train, test = scaled(train, estimates), scaled(test, estimates)
-    errors = [pooled_errors(part, [predicted(run, estimates) for run in part]) for part in (train, test)]
-    fitted = Fitted(estimates, errors[0], errors[1], [None] * robot.dof, None)
+    sums = [error_sums(parts, predicted(parts[0], estimates)) for parts in zip(train, test, strict=True)]
+    logs = [errors_of([parts[1] if parts[1].samples else parts[0]]) for parts in sums]
+    errors = [errors_of([parts[k] for parts in sums]) for k in (0, 1)]
+    fitted = Fitted(estimates, errors[0], errors[1], logs, [None] * robot.dof, None)
     if not diagnose:
         return fitted
     if not options.drive_gain:
-        fitted = replace(fitted, gravity=gravity_share(train, [item.gravity for item in runs], estimates, options))
+        fitted = replace(fitted, gravity=_gravity_share(robot, train, estimates, options))
     if gravity_text(fitted, train[0].gravity) is not None:
         return fitted  # torque that is missing altogether correlates with other joints, which says nothing about them
-    return replace(fitted, couplings=[coupling(train, test, j, estimates[j]) for j in range(robot.dof)])
+    couplings = []
+    for j, joint in enumerate(robot.joints):
+        tell(f"judging {joint.name}", 0.5 + 0.5 * j / robot.dof)
+        couplings.append(coupling(train, test, j, estimates[j]))
+    return replace(fitted, couplings=couplings)
+
+
+def _gravity_share(
+    robot: Robot, runs: Sequence[Run], estimates: Sequence[JointEstimate], options: RegressionOptions
+) -> GravityShare | None:
+    """Share of what carries the arm at rest, which is computed here so that nothing holds it longer."""
+    gravity = []
+    for run in runs:
+        still = np.zeros_like(run.q)
+        gravity.append(rnea(robot, run.q, still, still))
+    return gravity_share(runs, gravity, estimates, options)
 
 
 def scaled(runs: Sequence[Run], estimates: Sequence[JointEstimate]) -> list[Run]:

@@ -57,6 +57,11 @@ class IdentifyOptions:
             raise UsageError("--drive-gain cannot be combined with --bounds or --rigid-body: identify the gain first")
 
     @property
+    def recorded(self) -> EffortKind:
+        """What the effort is taken for; with an unknown drive gain it is fitted in its own units, as if torque."""
+        return "torque" if self.regression.drive_gain else self.effort
+
+    @property
     def data(self) -> dict[str, Any]:
         """For the result."""
         fit = self.regression

@@ -15,20 +15,24 @@ from modrob_cli.plot.friction import FrictionPanel, draw_friction
 from modrob_cli.plot.signals import SignalPanel, draw_signals
 from modrob_cli.plot.validation import TorquePicture, draw_torques
 from modrob_cli.workflows.identify_fit import Fitted, predicted, scaled
-from modrob_cli.workflows.identify_runs import LoadedRuns, LogRun
+from modrob_cli.workflows.identify_pooled import PooledRun, PooledRuns
 from modrob_cli.workflows.identify_summary import unit
 
 ZOOM = 12.0
 """Length of the zoom in periods of the cut-off frequency."""
 
+MOST_POINTS = 200_000
+"""Of more samples, evenly picked ones become points of the friction picture, which thins them further."""
 
-def friction_panels(robot: Robot, loaded: LoadedRuns, fitted: Fitted, confidence: float) -> list[FrictionPanel]:
+
+def friction_panels(robot: Robot, pooled: PooledRuns, fitted: Fitted, confidence: float) -> list[FrictionPanel]:
     """Friction over velocity of each joint, all logs together."""
-    train, test = scaled(loaded.train, fitted.estimates), scaled(loaded.test, fitted.estimates)
+    train, test = scaled(pooled.train, fitted.estimates), scaled(pooled.test, fitted.estimates)
+    step = 1 + sum(len(run.t) for run in train) // MOST_POINTS
     panels = []
     for j, joint in enumerate(robot.joints):
         estimate = fitted.estimates[j]
-        points = [_points(part, j, estimate) for part in (train, test)]
+        points = _points(train, test, j, estimate, step)
         top = max((float(np.max(np.abs(x[:, 0]), initial=0.0)) for x in points), default=0.0) or 1.0
         dq = np.unique(np.concatenate([np.linspace(-top, top, 401), np.linspace(-1, 1, 101) * 5.0 * estimate.width]))
         dq = dq[np.abs(dq) <= top]
@@ -41,23 +45,23 @@ def friction_panels(robot: Robot, loaded: LoadedRuns, fitted: Fitted, confidence
     return panels
 
 
-def draw_friction_of(robot: Robot, loaded: LoadedRuns, fitted: Fitted, confidence: float, path: Path) -> None:
+def draw_friction_of(robot: Robot, pooled: PooledRuns, panels: list[FrictionPanel], path: Path) -> None:
     """Picture of the friction of all joints."""
-    panels = friction_panels(robot, loaded, fitted, confidence)
-    logs = loaded.runs[0].train.name if len(loaded.runs) == 1 else f"{len(loaded.runs)} logs"
+    logs = pooled.runs[0].train.name if len(pooled.runs) == 1 else f"{len(pooled.runs)} logs"
     subtitle = "recorded torque minus rigid bodies and rotor, low-passed; standstill left out"
     draw_friction(f"{robot.name}: friction from {logs}", subtitle, panels, path)
 
 
-def _points(runs: list[Run], j: int, estimate: JointEstimate) -> Array:
-    """Velocities and what is left for the friction, shape (N, 2)."""
+def _points(train: list[Run], test: list[Run], j: int, estimate: JointEstimate, step: int) -> tuple[Array, Array]:
+    """Velocities and what is left for the friction, of both parts, shape (N, 2) each; every ``step``-th sample."""
     armature = estimate.model().get("reflected_inertia", 0.0)
-    parts = [np.empty((0, 2))]
-    for run in runs:
-        left = run.filtered(run.tau[:, j] - run.tau_rigid[:, j] - armature * run.ddq[:, j])
-        shown = run.used & (np.abs(run.dq[:, j]) > run.standstill[j])
-        parts.append(np.column_stack([run.dq[shown, j], left[shown]]))
-    return np.concatenate(parts)
+    parts: tuple[list[Array], list[Array]] = ([np.empty((0, 2))], [np.empty((0, 2))])
+    for fitted, held_out in zip(train, test, strict=True):
+        left = fitted.filtered(fitted.tau[:, j] - fitted.tau_rigid[:, j] - armature * fitted.ddq[:, j])
+        for found, run in zip(parts, (fitted, held_out), strict=True):
+            shown = np.flatnonzero(run.used & (np.abs(run.dq[:, j]) > run.standstill[j]))[::step]
+            found.append(np.column_stack([run.dq[shown, j], left[shown]]))
+    return np.concatenate(parts[0]), np.concatenate(parts[1])
 
 
 def _captions(joint: Joint, estimate: JointEstimate) -> tuple[str, ...]:
@@ -74,22 +78,7 @@ def _captions(joint: Joint, estimate: JointEstimate) -> tuple[str, ...]:
     return tuple(texts)
 
 
-def worst_log(loaded: LoadedRuns, fitted: Fitted) -> LogRun:
-    """The log that is predicted worst by the sum over joints of squared errors relative to the recorded torque."""
-
-    def badness(item: LogRun) -> float:
-        run = scaled([item.test if item.test.used.any() else item.train], fitted.estimates)[0]
-        residual = (run.tau - predicted(run, fitted.estimates))[run.used]
-        if not len(residual):
-            return -1.0
-        size = np.mean(run.tau[run.used] ** 2, axis=0)
-        known = size > 0.0
-        return float(np.sum(np.mean(residual[:, known] ** 2, axis=0) / size[known]))
-
-    return max(loaded.runs, key=badness)
-
-
-def draw_torques_of(robot: Robot, item: LogRun, fitted: Fitted, path: Path) -> None:
+def draw_torques_of(robot: Robot, item: PooledRun, fitted: Fitted, path: Path) -> None:
     """Recorded and predicted torque of one log; the fitted and the held-out part are named in the title."""
     whole = scaled([item.whole], fitted.estimates)[0]
     units = tuple(unit(joint, "offset") for joint in robot.joints)
@@ -108,9 +97,9 @@ def draw_torques_of(robot: Robot, item: LogRun, fitted: Fitted, path: Path) -> N
     draw_torques(TorquePicture(title, subtitle, *series, robot.joint_names, units, captions), path)
 
 
-def draw_filter_of(robot: Robot, item: LogRun, reason: str, path: Path) -> None:
-    """What the low-pass did to one log."""
-    run, log = item.whole, item.log
+def draw_filter_of(robot: Robot, item: PooledRun, log: JointLog, reason: str, path: Path) -> None:
+    """What the low-pass did to one log, ``log`` being what was recorded."""
+    run = item.whole
     raw = _recorded_velocity(log, run.t)
     rate, cutoff = run.signals.rate, run.signals.cutoff
     frequency, raw_density = spectrum(raw, rate)

@@ -1,44 +1,61 @@
 """The HTML report of an identification."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from modrob_cli.model.robot import Robot
-from modrob_cli.plot.friction import friction_svg
+from modrob_cli.plot.friction import FrictionPanel, friction_svg
 from modrob_cli.plot.residuals import JointResiduals, residual_figure
 from modrob_cli.report.document import Block, Notes, Picture, Report, Section, Table, Tone, Verdict
 from modrob_cli.workflows.identify_fit import Fitted, predicted, scaled
+from modrob_cli.workflows.identify_fleet import identify_fleet_sections
 from modrob_cli.workflows.identify_options import IdentifyOptions
-from modrob_cli.workflows.identify_pictures import friction_panels, worst_log
-from modrob_cli.workflows.identify_runs import LoadedRuns
+from modrob_cli.workflows.identify_pooled import PooledRun
+from modrob_cli.workflows.identify_report_logs import input_rows, log_sections, skipped_section
 from modrob_cli.workflows.identify_summary import UNITS, rotor_side, unit
 
 Entry = dict[str, Any]
 
 
 def identification_report(
-    robot: Robot, loaded: LoadedRuns, fitted: Fitted, result: Entry, options: IdentifyOptions
+    robot: Robot,
+    item: PooledRun,
+    panels: Sequence[FrictionPanel],
+    fitted: Fitted,
+    result: Entry,
+    options: IdentifyOptions,
 ) -> Report:
-    """Verdict and scope first, then parameters with intervals, errors, friction and what is left of the worst log."""
+    """Verdict and scope first, then parameters with intervals, errors, friction, drift, and what is left of one log.
+
+    Parameters
+    ----------
+    item : the log that is predicted worst
+    panels : friction of all joints
+    """
     confidence = options.regression.confidence
-    item = worst_log(loaded, fitted)
-    count = "1 log" if len(loaded.runs) == 1 else f"{len(loaded.runs)} logs"
+    count = "1 log" if len(result["logs"]) == 1 else f"{len(result['logs'])} logs"
+    left_out = f", {len(result['skipped'])} more left out" if result["skipped"] else ""
+    source = item.found.job.label
     sections = [
+        *skipped_section(result["skipped"]),
         Section("Parameters", tuple(_parameters(robot, result, confidence))),
         Section("How well they predict", tuple(_errors(result, fitted))),
-        Section("Friction over velocity", tuple(_friction(robot, loaded, fitted, confidence))),
-        Section(f"{item.path}: joint by joint (the log that is predicted worst)", tuple(_left(robot, loaded, fitted))),
-        Section("Logs and signals", tuple(_logs(result))),
+        Section("Friction over velocity", tuple(_friction(panels))),
+        *identify_fleet_sections(result["logs"]),
+        Section(f"{source}: joint by joint (the log that is predicted worst)", tuple(_left(robot, item, fitted))),
+        *log_sections(result),
         Section("Correlations of the estimates", tuple(_correlations(result)), folded=True),
     ]
+    place = 3 if result["skipped"] else 2
     if "rigid_body" in result:
-        sections.insert(2, Section("Rigid bodies", tuple(_rigid_body(result["rigid_body"]))))
+        sections.insert(place, Section("Rigid bodies", tuple(_rigid_body(result["rigid_body"]))))
     if "bounds" in result:
-        sections.insert(2, Section("Intervals that hold every sample", tuple(_bounds(result["bounds"]))))
+        sections.insert(place, Section("Intervals that hold every sample", tuple(_bounds(result["bounds"]))))
     return Report(
         f"Identification of {robot.name}",
-        f"{count}; effort is {options.effort}; intervals of {confidence:.0%}",
+        f"{count}{left_out}; effort is {options.effort}; intervals of {confidence:.0%}",
         _verdict(result),
         tuple(sections),
         _provenance(result),
@@ -97,17 +114,16 @@ def _errors(result: Entry, fitted: Fitted) -> list[Block]:
     return [Table(header, tuple(rows), caption, tones)]
 
 
-def _friction(robot: Robot, loaded: LoadedRuns, fitted: Fitted, confidence: float) -> list[Block]:
+def _friction(panels: Sequence[FrictionPanel]) -> list[Block]:
     out: list[Block] = []
-    for k, panel in enumerate(friction_panels(robot, loaded, fitted, confidence)):
+    for k, panel in enumerate(panels):
         alternative = f"Friction of {panel.name} over velocity: samples, fitted curve and its confidence band"
         caption = f"{panel.name}: {'; '.join(panel.captions)}"
         out.append(Picture(friction_svg(panel, f"friction{k}"), caption, alternative))
     return out
 
 
-def _left(robot: Robot, loaded: LoadedRuns, fitted: Fitted) -> list[Block]:
-    item = worst_log(loaded, fitted)
+def _left(robot: Robot, item: PooledRun, fitted: Fitted) -> list[Block]:
     whole = scaled([item.whole], fitted.estimates)[0]
     torque, used = predicted(whole, fitted.estimates), item.train.used | item.test.used
     out: list[Block] = []
@@ -123,17 +139,6 @@ def _left(robot: Robot, loaded: LoadedRuns, fitted: Fitted) -> list[Block]:
         picture = residual_figure(JointResiduals(*names, *series, used), f"left{j}", "+-2 RMS of the residual")
         out.append(Picture(picture, caption, alternative))
     return out
-
-
-def _logs(result: Entry) -> list[Block]:
-    keys = ("log", "duration", "samples", "samples_fitted", "samples_held_out", "rate", "velocity")
-    rows = tuple(tuple(entry[key] for key in keys) for entry in result["logs"])
-    header = ("log", "duration [s]", "samples", "fitted", "held out", "rate [Hz]", "velocity")
-    signals = result["signals"]
-    notes = [f"low-pass at {signals['cutoff']:.4g} Hz: {signals['rule']}"]
-    notes += [f"{entry['log']}: {note}" for entry in result["logs"] for note in entry["notes"]]
-    notes += [f"{entry['log']}: left out: {entry['reason']}" for entry in result["skipped"]]
-    return [Table(header, rows), Notes(tuple(notes))]
 
 
 def _correlations(result: Entry) -> list[Block]:
@@ -179,5 +184,4 @@ def _rigid_body(entry: Entry) -> list[Block]:
 def _provenance(result: Entry) -> tuple[tuple[str, str], ...]:
     rows = [("modrob", str(result["provenance"]["modrob"]))]
     rows += [(key.replace("_", " "), str(value)) for key, value in result["options"].items() if value is not None]
-    rows += [(name, str(value)) for name, value in result["provenance"]["inputs"].items()]
-    return tuple(rows)
+    return (*rows, *input_rows(result["provenance"]["inputs"]))

@@ -3,14 +3,18 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+import numpy as np
+
 from modrob_cli.identify.prediction_pooled import PooledError
 from modrob_cli.identify.regression_result import JointEstimate
 from modrob_cli.identify.run import Run
 from modrob_cli.io.csv_writer import csv_text
 from modrob_cli.model.joint import Joint
+from modrob_cli.model.log import JointLog
 from modrob_cli.model.robot import Robot
 from modrob_cli.workflows.identify_fit import Fitted, reasons_against
-from modrob_cli.workflows.identify_runs import LogRun
+from modrob_cli.workflows.identify_runs import Parts
+from modrob_cli.workflows.log_date import log_date
 
 UNITS = {
     "offset": ("N m", "N"),
@@ -136,61 +140,66 @@ def error_entry(errors: list[PooledError] | None, j: int) -> dict[str, Any] | No
     }
 
 
-def log_entry(
-    robot: Robot, item: LogRun, pooled: list[PooledError] | None, alone: Fitted | str | None
-) -> dict[str, Any]:
-    """One log: how it was read, how the pooled fit predicts it, and its own fit (or why there is none)."""
-    signals = item.whole.signals
-    entry: dict[str, Any] = {
-        "log": str(item.path),
-        "duration": float(item.log.t[-1]),
-        "samples": len(item.log.t),
-        "samples_fitted": int(item.train.used.sum()),
-        "samples_held_out": int(item.test.used.sum()),
-        "rate": signals.rate,
-        "velocity": "recorded" if item.log.dq is not None else "differentiated",
-        "resampled": signals.resampled,
-        "longest_gap": signals.gap,
-        "repeated_stamps": item.log.repeated,
-        "notes": [*item.log.notes, *_glitch_notes(item.whole.glitches)],
-        "prediction": None if pooled is None else [_prediction(robot, pooled, j) for j in range(robot.dof)],
+def log_facts(log: JointLog) -> dict[str, Any]:
+    """What a log is, as it was read."""
+    return {
+        "date": log_date(log.start),
+        "duration": float(log.t[-1]),
+        "samples": len(log.t),
+        "rate": 1.0 / float(np.median(np.diff(log.t))),
+        "velocity": "recorded" if log.dq is not None else "differentiated",
+        "repeated_stamps": log.repeated,
+        "notes": list(log.notes),
     }
-    if isinstance(alone, str):
-        entry["fit"] = None
-        entry["notes"].append(f"no fit of its own: {alone}")
-    elif alone is not None:
-        entry["fit"] = [
-            {
-                "name": joint.name,
-                **parameters(joint, alone.estimates[j]),
-                "training": error_entry(alone.train, j),
-                "holdout": error_entry(alone.test, j),
-            }
-            for j, joint in enumerate(robot.joints)
-        ]
-    return entry
 
 
-def _glitch_notes(count: int) -> list[str]:
-    return [f"{count} single wild samples of position or velocity were replaced"] if count else []
+def part_facts(parts: Parts) -> dict[str, Any]:
+    """What of a log counts, made ready with some cut-off."""
+    return {
+        "samples_fitted": int(parts.train.used.sum()),
+        "samples_held_out": int(parts.test.used.sum()),
+        "resampled": parts.whole.signals.resampled,
+        "longest_gap": parts.whole.signals.gap,
+    }
 
 
-def _prediction(robot: Robot, errors: list[PooledError], j: int) -> dict[str, Any]:
-    return {"name": robot.joints[j].name, **(error_entry(errors, j) or {})}
+def glitch_notes(run: Run) -> list[str]:
+    """What was repaired, in words."""
+    return [f"{run.glitches} single wild samples of position or velocity were replaced"] if run.glitches else []
 
 
-def parameters_csv(robot: Robot, pooled: Fitted, alone: Sequence[tuple[str, Fitted]]) -> str:
-    """Table of all parameters: the pooled fit first, then that of each log."""
+def fit_entry(robot: Robot, fitted: Fitted) -> list[dict[str, Any]]:
+    """Parameters and errors of a fit to one log, joint by joint."""
+    return [
+        {
+            "name": joint.name,
+            "type": joint.type,
+            **parameters(joint, fitted.estimates[j]),
+            "training": error_entry(fitted.train, j),
+            "holdout": error_entry(fitted.test, j),
+        }
+        for j, joint in enumerate(robot.joints)
+    ]
+
+
+def prediction_entry(robot: Robot, errors: list[PooledError] | None) -> list[dict[str, Any]] | None:
+    """How the pooled fit predicts one log, joint by joint; None without a sample to judge by."""
+    if errors is None:
+        return None
+    return [{"name": joint.name, **(error_entry(errors, j) or {})} for j, joint in enumerate(robot.joints)]
+
+
+def parameters_csv(robot: Robot, fits: Sequence[tuple[str, Sequence[dict[str, Any]]]]) -> str:
+    """Table of all parameters of some fits, each with its name and entries of its joints."""
     header = ("log", "joint", "parameter", "unit", "side", "value", "stderr", "lower", "upper", "verdict")
     rows: list[tuple[object, ...]] = []
-    for name, fitted in [("pooled", pooled), *alone]:
-        for joint, estimate in zip(robot.joints, fitted.estimates, strict=True):
-            rows += [(name, joint.name, *row) for row in _rows(joint, estimate)]
+    for name, entries in fits:
+        for joint, found in zip(robot.joints, entries, strict=True):
+            rows += [(name, joint.name, *row) for row in _rows(joint, found)]
     return csv_text(header, rows)
 
 
-def _rows(joint: Joint, estimate: JointEstimate) -> Iterator[tuple[object, ...]]:
-    found = parameters(joint, estimate)
+def _rows(joint: Joint, found: dict[str, Any]) -> Iterator[tuple[object, ...]]:
     for name in UNITS:
         side = rotor_side(joint) if name == "rotor_inertia" else "joint"
         lower, upper = found["interval"].get(name) or (None, None)

@@ -17,38 +17,45 @@ from modrob_cli.io.joint_summary import (
     summarize_times,
 )
 from modrob_cli.io.log_options import LogOptions
+from modrob_cli.io.log_sources import local_copy
 from modrob_cli.io.mcap_reader import read_recording
 from modrob_cli.model.log import Recording
 
-Tracker = Callable[[Sequence[Path]], Iterable[Path]]
+Tracker = Callable[[Sequence[str]], Iterable[str]]
 
 
-def log_info(logs: Sequence[Path], options: LogOptions, track: Tracker = iter) -> dict[str, Any]:
+def log_info(logs: Sequence[str | Path], options: LogOptions, track: Tracker = iter) -> dict[str, Any]:
     """Describe logs.
 
     Parameters
     ----------
+    logs : paths or URLs
     track : wraps the list of logs, to show progress
 
     Returns
     -------
-    result : plain data for JSON, as documented in ``docs/logs.md``
+    result : plain data for JSON, as documented in ``docs/logs.md``; "skipped" has files of which nothing can be read,
+        and damaged ones if ``options.strict``
 
     Raises
     ------
     InputFileError
-        With the faults of all files of which nothing can be read; of all damaged ones if ``options.strict``.
+        If all are, with the faults of all.
     """
     results: list[dict[str, Any]] = []
+    skipped: list[dict[str, Any]] = []
     faults: list[Fault] = []
-    for path in track(list(logs)):
+    for source in track([str(log) for log in logs]):
         try:
-            results.append(_csv_info(path, options) if path.suffix.lower() == ".csv" else _mcap_info(path, options))
+            with local_copy(source) as path:
+                found = _csv_info(path, options) if path.suffix.lower() == ".csv" else _mcap_info(path, options)
+            results.append({**found, "log": source})
         except InputFileError as error:
             faults.extend(error.faults)
-    if faults:
+            skipped.append({"log": source, "reason": str(error), "code": error.exit_code})
+    if faults and not results:
         raise InputFileError(faults)
-    return {"logs": results}
+    return {"logs": results, "skipped": skipped}
 
 
 def _mcap_info(path: Path, options: LogOptions) -> dict[str, Any]:

@@ -1,40 +1,50 @@
 """Compare the torques that a model predicts with recorded ones."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from modrob_cli.io.number_csv import NumberCsv
-from modrob_cli.io.outputs import OutputFolder, provenance
+from modrob_cli.batch.jobs import BatchOptions, Listener, Outcome
+from modrob_cli.batch.runner import BatchRun
+from modrob_cli.batch.settle_all import settle_all
+from modrob_cli.io.log_record import record_text
+from modrob_cli.io.outputs import OutputFolder
+from modrob_cli.io.table_writer import csv_table, parquet_table
 from modrob_cli.model.robot import Robot
-from modrob_cli.plot.validation import TorquePicture, draw_torques
 from modrob_cli.report.render import render
-from modrob_cli.workflows.identify_runs import Tracker, unique_stems
+from modrob_cli.workflows.batch_result import (
+    input_hashes,
+    jobs_of,
+    log_files,
+    overall_provenance,
+    skipped_entries,
+)
 from modrob_cli.workflows.robots import load_robot
-from modrob_cli.workflows.validate_judge import Judged, JudgedLog, judge
+from modrob_cli.workflows.validate_fleet import validation_fleet_report
+from modrob_cli.workflows.validate_judge import friction_from
 from modrob_cli.workflows.validate_options import ValidateOptions
-from modrob_cli.workflows.validate_report import validation_report
-from modrob_cli.workflows.validate_result import SCOPES, junit, log_result, passed
+from modrob_cli.workflows.validate_result import SCOPES, junit, passed
+from modrob_cli.workflows.validate_table import validation_table
+from modrob_cli.workflows.validate_task import ValidateTask
 
-_PER_LOG = ("json", "png", "csv")
+NO_BATCH = BatchOptions()
 
 
 def validate(
     robot_path: Path,
-    logs: Sequence[Path],
+    logs: Sequence[str | Path],
     options: ValidateOptions,
     out: Path,
     overwrite: bool = False,
-    track: Tracker = iter,
+    batch: BatchOptions = NO_BATCH,
+    listener: Listener | None = None,
 ) -> dict[str, Any]:
-    """Compare predicted with recorded torque: a report over all logs; JSON, picture and CSV for each.
+    """Compare predicted with recorded torque: JSON and CSV for each log, a report over all logs.
 
     Parameters
     ----------
-    track : wraps the list of logs, to show progress
+    logs : paths or URLs
+    listener : called with the outcome of each log as it comes
 
     Returns
     -------
@@ -42,68 +52,71 @@ def validate(
 
     Raises
     ------
-    InputFileError
-        With the faults of all logs; nothing is written then.
     UsageError
-        If options, robot and logs do not fit together.
-    NumericalError
-        If all logs are too short.
+        If options and robot do not fit together, or another run uses the folder.
+    FailedLogsError
+        If no log can be judged.
     OutputExistsError
-        If a file is there already and ``overwrite`` is false.
+        If there are results already that may not be replaced.
+    StoppedError
+        If a signal stops the run.
     """
     options.check()
     loaded = load_robot(robot_path)
-    robot = loaded.robot
-    common = {"report": f"{robot.name}.validate.html", "junit": f"{robot.name}.validate.junit.xml"}
-    with OutputFolder(out, overwrite) as folder:
-        folder.claim([f"{stem}.validate.{kind}" for stem in unique_stems(logs) for kind in _PER_LOG])
-        folder.claim(list(common.values()))
-        judged = judge(loaded, logs, options, track)
-        results = [log_result(robot, log, options) for log in judged.logs]
-        head = _head(judged, results, options)
-        made_from = provenance([*loaded.files, *logs])
-        for log, result in zip(judged.logs, results, strict=True):
-            stem = f"{log.item.log.name}.validate"
-            text = json.dumps({**head, "logs": [result], "provenance": made_from}, indent=2, allow_nan=False)
-            folder.write(f"{stem}.json", text + "\n")
-            _draw(robot, log, judged, folder.stage(f"{stem}.png"))
-            _write_series(robot, log, folder.stage(f"{stem}.csv"))
-        page = render(validation_report(robot, judged, results, head, options, made_from))
-        folder.write(common["report"], page)
-        folder.write(common["junit"], junit(robot, results, judged, options))
-    names = [f"{log.item.log.name}.validate.{kind}" for log in judged.logs for kind in _PER_LOG]
-    files = {kind: str(out / name) for kind, name in common.items()} | {name: str(out / name) for name in names}
-    return {**head, "logs": results, "provenance": made_from, "files": files}
+    robot, jobs, several = loaded.robot, jobs_of(logs, loaded.robot.name), len(logs) > 1
+    common = _names(robot, several)
+    inputs = input_hashes(loaded.files)
+    task = ValidateTask(loaded, options, inputs, None if several else common["report"])
+    with BatchRun(task, out, batch, overwrite) as run:
+        run.claim(jobs, list(common.values()))
+        outcomes = settle_all(run, jobs, worst_nrmse, listener)
+        result = _result(robot, outcomes, inputs, options)
+        with run.outputs() as folder:
+            _write(folder, robot, result, options, common)
+    files = {kind: str(out / name) for kind, name in common.items()} | log_files(outcomes, task.command, out)
+    return {**result, "files": files}
 
 
-def _head(judged: Judged, results: list[dict[str, Any]], options: ValidateOptions) -> dict[str, Any]:
+def worst_nrmse(record: dict[str, Any]) -> float:
+    """NRMSE of the worst joint of a log; infinite where no torque was recorded."""
+    (log,) = record["logs"]
+    return max(float("inf") if joint["nrmse"] is None else float(joint["nrmse"]) for joint in log["joints"])
+
+
+def _names(robot: Robot, several: bool) -> dict[str, str]:
+    stem = f"{robot.name}.validate"
+    names = {"report": f"{stem}.html", "junit": f"{stem}.junit.xml"}
+    if several:
+        names |= {"summary": f"{stem}.summary.json", "table": f"{stem}.logs.csv", "parquet": f"{stem}.logs.parquet"}
+    return names
+
+
+def _result(
+    robot: Robot, outcomes: Sequence[Outcome], inputs: dict[str, str], options: ValidateOptions
+) -> dict[str, Any]:
+    results = [outcome.done["logs"][0] for outcome in outcomes if outcome.record is not None]
+    skipped = skipped_entries(outcomes)
+    friction = friction_from(robot, options)
     return {
-        "passed": passed(judged, results, options),
-        "friction": judged.friction,
-        "scope": SCOPES[judged.friction],
-        "skipped": [{"log": str(path), "reason": reason} for path, reason in judged.skipped],
+        "passed": passed(results, skipped),
+        "friction": friction,
+        "scope": SCOPES[friction],
+        "skipped": skipped,
         "options": options.data,
+        "logs": results,
+        "provenance": overall_provenance(inputs, outcomes),
     }
 
 
-def _write_series(robot: Robot, log: JudgedLog, path: Path) -> None:
-    """Recorded and predicted torque with its bounds at each sample, and whether it counts."""
-    kinds = ("recorded", "predicted", "lower", "upper")
-    header = ["t", "used", *(f"{name}.{kind}" for name in robot.joint_names for kind in kinds)]
-    parts = (log.run.tau, log.bounds.nominal, log.bounds.lower, log.bounds.upper)
-    series = np.stack(parts, axis=-1).reshape(len(log.run.t), -1)
-    with NumberCsv(path, header) as table:
-        table.write(np.column_stack([log.run.t, log.used, series]))
-
-
-def _draw(robot: Robot, log: JudgedLog, judged: Judged, path: Path) -> None:
-    units = tuple("N m" if joint.type == "revolute" else "N" for joint in robot.joints)
-    captions = tuple(
-        f"RMSE {error.rmse:.3g} {unit}"
-        + (f", NRMSE {error.nrmse:.3f}" if error.nrmse is not None else ", no torque recorded")
-        for error, unit in zip(log.errors, units, strict=True)
-    )
-    subtitle = f"friction: {judged.friction}; low-pass {log.run.signals.cutoff:.3g} Hz; grey: not counted"
-    series = (log.run.t, log.run.tau, log.bounds.nominal, log.used)
-    title = f"{robot.name}: {log.item.log.name}"
-    draw_torques(TorquePicture(title, subtitle, *series, robot.joint_names, units, captions), path)
+def _write(
+    folder: OutputFolder, robot: Robot, result: dict[str, Any], options: ValidateOptions, names: dict[str, str]
+) -> None:
+    """Results about all logs; the page of a single log is there already."""
+    folder.write(names["junit"], junit(robot, result["logs"], result["skipped"], options))
+    if "summary" not in names:
+        return
+    folder.write(names["summary"], record_text(result))
+    table = validation_table(result["logs"])
+    folder.write(names["table"], csv_table(table))
+    folder.write(names["parquet"], parquet_table(table))
+    folder.write(names["report"], render(validation_fleet_report(robot.name, result, options)))

@@ -1,4 +1,4 @@
-"""Logs against the model: prediction, bounds, and which samples may judge them."""
+"""One log against the model: prediction, bounds, and which samples may judge it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ from modrob_cli.model.robot import Robot
 from modrob_cli.workflows.identify_fit import fit_all, predicted
 from modrob_cli.workflows.identify_options import IdentifyOptions
 from modrob_cli.workflows.identify_robot import identified_robot
-from modrob_cli.workflows.identify_runs import LogRun, Tracker, load_runs
+from modrob_cli.workflows.identify_runs import LogRun, read_run
 from modrob_cli.workflows.robots import LoadedRobot
 from modrob_cli.workflows.validate_options import FrictionFrom, ValidateOptions
 
@@ -52,47 +52,28 @@ class JudgedLog:
     inside: Array
 
 
-@dataclass(frozen=True)
-class Judged:
-    """All logs.
-
-    Attributes
-    ----------
-    friction : where friction came from
-    skipped : path and reason of logs that are too short
-    """
-
-    logs: list[JudgedLog]
-    friction: FrictionFrom
-    skipped: list[tuple[Path, str]]
-
-
-def judge(loaded: LoadedRobot, paths: Sequence[Path], options: ValidateOptions, track: Tracker = iter) -> Judged:
-    """Read all logs and compare them with the model.
+def judge_log(loaded: LoadedRobot, path: Path, options: ValidateOptions) -> JudgedLog:
+    """Read one log and compare it with the model.
 
     Raises
     ------
     InputFileError
-        With the faults of all logs.
+        If the log cannot be used.
     UsageError
-        If options, robot and logs do not fit together.
+        If options, robot and log do not fit together.
     NumericalError
-        If all logs are too short.
+        If it is too short.
     """
-    robot = loaded.robot
-    friction = options.friction or ("file" if has_friction(robot) else "held-out")
+    friction = friction_from(loaded.robot, options)
     holdout = options.holdout if friction == "held-out" else 0.0
     reading = IdentifyOptions(options.effort, options.reading, options.cutoff, holdout)
-    runs = load_runs(robot, paths, reading, track)
-    logs, skipped = [], list(runs.skipped)
-    for item in runs.runs:
-        try:
-            logs.append(_by_file(loaded, item) if friction == "file" else _by_fit(robot, item, friction))
-        except NumericalError as error:
-            skipped.append((item.path, str(error)))
-    if not logs:
-        raise NumericalError("\n".join(f"{path}: {reason}" for path, reason in skipped))
-    return Judged(logs, friction, skipped)
+    item = read_run(loaded.robot, path, reading)
+    return _by_file(loaded, item) if friction == "file" else _by_fit(loaded.robot, item, friction)
+
+
+def friction_from(robot: Robot, options: ValidateOptions) -> FrictionFrom:
+    """Where friction comes from: as asked for, else the robot file if it says anything of it."""
+    return options.friction or ("file" if has_friction(robot) else "held-out")
 
 
 def has_friction(robot: Robot) -> bool:
@@ -106,17 +87,17 @@ def _by_file(loaded: LoadedRobot, item: LogRun) -> JudgedLog:
     run = item.whole
     digest = sha256(item.path) if loaded.identified_from else ""
     known = [used for used in loaded.identified_from if used.sha256 == digest]
-    taken = _taken(run, known)
+    taken = taken_samples(run.t - run.t[0], run.signals.cutoff, known)
     used = run.used & ~taken
     fitted = bool(known) and not used.any()
     counted = run.used if fitted else used
     excluded = 0.0 if fitted else float(np.count_nonzero(taken)) / run.signals.rate
-    return _judged(item, run, _bounds(loaded.robot, run), counted, fitted, excluded, None)
+    return _judged(item, run, bounds_along(loaded.robot, run), counted, fitted, excluded, None)
 
 
-def _taken(run: Run, known: Sequence[UsedLog]) -> Mask:
-    """Samples that were fitted, and those that the filter mixes with them."""
-    since, smear = run.t - run.t[0], MARGIN / run.signals.cutoff
+def taken_samples(since: Array, cutoff: float, known: Sequence[UsedLog]) -> Mask:
+    """Samples that were fitted, and those that the filter mixes with them; times (N,) since the first one, [s]."""
+    smear = MARGIN / cutoff
     taken = np.zeros(len(since), dtype=bool)
     for used in known:
         end = np.inf if used.end is None else used.end + smear
@@ -129,11 +110,11 @@ def _by_fit(robot: Robot, item: LogRun, friction: FrictionFrom) -> JudgedLog:
     estimates = fit_all(robot, [item], RegressionOptions(), diagnose=False).estimates
     fitted_robot = identified_robot(robot, estimates, [item.train])
     run = item.train if friction == "in-sample" else item.test
-    bounds = replace(_bounds(fitted_robot, run), nominal=predicted(run, estimates))
+    bounds = replace(bounds_along(fitted_robot, run), nominal=predicted(run, estimates))
     return _judged(item, run, bounds, run.used, friction == "in-sample", 0.0, estimates)
 
 
-def _bounds(robot: Robot, run: Run) -> TorqueBounds:
+def bounds_along(robot: Robot, run: Run) -> TorqueBounds:
     """Bounds along the low-passed motion; where its velocity may be noise, so may be the direction of friction."""
     joints = tuple(_with_band(joint, float(band)) for joint, band in zip(robot.joints, run.standstill, strict=True))
     gravity = robot.gravity if run.gravity else np.zeros(3)

@@ -1,13 +1,17 @@
 """A validation as plain data for JSON, CSV and CI."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
+from modrob_cli.identify.regression_result import JointEstimate
 from modrob_cli.io.junit import CheckCase, junit_text
+from modrob_cli.model.joint import Joint
 from modrob_cli.model.robot import Robot
-from modrob_cli.workflows.validate_judge import Judged, JudgedLog
+from modrob_cli.workflows.log_date import log_date
+from modrob_cli.workflows.validate_judge import JudgedLog
 from modrob_cli.workflows.validate_options import ValidateOptions
 
 TERMS = ("offset", "coulomb", "viscous", "reflected_inertia")
@@ -30,11 +34,12 @@ SCOPES = {
 }
 
 
-def log_result(robot: Robot, log: JudgedLog, options: ValidateOptions) -> dict[str, Any]:
-    """Everything about one log."""
+def log_result(robot: Robot, source: str, log: JudgedLog, options: ValidateOptions) -> dict[str, Any]:
+    """Everything about one log; ``source`` is its path or URL as it was given."""
     signals = log.run.signals
     return {
-        "log": str(log.item.path),
+        "log": source,
+        "date": log_date(log.item.log.start),
         "joints": [_joint(robot, log, j, options) for j in range(robot.dof)],
         "duration": float(log.item.log.t[-1]),
         "samples": len(log.item.log.t),
@@ -53,24 +58,32 @@ def log_result(robot: Robot, log: JudgedLog, options: ValidateOptions) -> dict[s
 
 
 def _joint(robot: Robot, log: JudgedLog, j: int, options: ValidateOptions) -> dict[str, Any]:
-    joint, error = robot.joints[j], log.errors[j]
-    entry: dict[str, Any] = {"name": joint.name, **asdict(error), "inside": float(log.inside[j])}
-    entry["unit"] = "N m" if joint.type == "revolute" else "N"
-    entry["mean_width"] = float(np.mean((log.bounds.upper - log.bounds.lower)[log.used, j]))
-    entry["passed"] = None if not judges(log, options) else not failures(entry, options)
-    if log.estimates is not None:
-        estimate = log.estimates[j]
+    width = float(np.mean((log.bounds.upper - log.bounds.lower)[log.used, j]))
+    figures = {**asdict(log.errors[j]), "inside": float(log.inside[j]), "mean_width": width}
+    estimate = None if log.estimates is None else log.estimates[j]
+    return joint_entry(robot.joints[j], figures, estimate, log.fitted, options)
+
+
+def joint_entry(
+    joint: Joint, figures: dict[str, Any], estimate: JointEstimate | None, fitted: bool, options: ValidateOptions
+) -> dict[str, Any]:
+    """Everything about one joint of a log.
+
+    Parameters
+    ----------
+    figures : its errors, ``inside`` and ``mean_width``
+    estimate : friction that was fitted here; None if it comes from the file
+    fitted : whether it was fitted to the samples that count
+    """
+    entry: dict[str, Any] = {"name": joint.name, **figures, "unit": "N m" if joint.type == "revolute" else "N"}
+    judges = options.wants_verdict and (not fitted or options.accept_fitted)
+    entry["passed"] = not failures(entry, options) if judges else None
+    entry["notes"] = []
+    if estimate is not None:
         entry["fit"] = {term: estimate.value(term) for term in TERMS}
-        entry["notes"] = list(estimate.notes)
+        entry["notes"] += estimate.notes
         entry["notes"] += [f"{term}: {found.reason}" for term, found in estimate.estimates.items() if found.reason]
-    else:
-        entry["notes"] = []
     return entry
-
-
-def judges(log: JudgedLog, options: ValidateOptions) -> bool:
-    """Whether this log gives a verdict."""
-    return options.wants_verdict and (not log.fitted or options.accept_fitted)
 
 
 def failures(joint: dict[str, Any], options: ValidateOptions) -> list[str]:
@@ -84,15 +97,17 @@ def failures(joint: dict[str, Any], options: ValidateOptions) -> list[str]:
     return found
 
 
-def passed(judged: Judged, results: list[dict[str, Any]], options: ValidateOptions) -> bool | None:
+def passed(results: Sequence[dict[str, Any]], skipped: Sequence[object]) -> bool | None:
     """The verdict: None if nobody asked or nothing may judge; logs that were skipped cannot pass."""
-    if not any(judges(log, options) for log in judged.logs):
+    verdicts = [joint["passed"] for result in results for joint in result["joints"]]
+    if all(verdict is None for verdict in verdicts):
         return None
-    joints = [joint for result in results for joint in result["joints"]]
-    return not judged.skipped and all(joint["passed"] is not False for joint in joints)
+    return not skipped and False not in verdicts
 
 
-def junit(robot: Robot, results: list[dict[str, Any]], judged: Judged, options: ValidateOptions) -> str:
+def junit(
+    robot: Robot, results: Sequence[dict[str, Any]], skipped: Sequence[dict[str, Any]], options: ValidateOptions
+) -> str:
     """One test for each joint of each log, and a failed one for each log that was skipped."""
     cases = []
     for result in results:
@@ -102,5 +117,5 @@ def junit(robot: Robot, results: list[dict[str, Any]], judged: Judged, options: 
             text = f"NRMSE {ratio}, RMSE {joint['rmse']:.6g} {joint['unit']}, inside {joint['inside']:.4f}"
             judged_here = joint["passed"] is not None
             cases.append(CheckCase(result["log"], joint["name"], said if judged_here else None, text, not judged_here))
-    cases += [CheckCase(str(path), "readable", reason, reason) for path, reason in judged.skipped]
+    cases += [CheckCase(entry["log"], "readable", entry["reason"], entry["reason"]) for entry in skipped]
     return junit_text(f"modrob validate {robot.name}", cases)

@@ -27,13 +27,14 @@ BELOW: dict[str, set[str]] = {
     "io": BOTTOM | {"interval", "spatial", "model", "schema", "__init__"},
     "plot": BOTTOM | {"interval", "spatial", "model"},
     "report": BOTTOM | {"interval", "spatial", "model"},
+    "batch": BOTTOM | {"io", "__init__"},
 }
 BELOW["workflows"] = set(BELOW) - {"__init__"} | {"__init__"}
-BELOW["cli"] = {"workflows", "schema", "io", "__init__"} | BOTTOM
+BELOW["cli"] = {"workflows", "batch", "schema", "io", "__init__"} | BOTTOM
 """Rooms that a room may import, itself left out. cli also takes document kinds and angles from schema, and what
-ships with the tool from io."""
+ships with the tool from io, and options and outcomes of a batch."""
 
-HEAVY = {"matplotlib", "pinocchio", "scipy", "mcap", "mcap_ros2", "rich"}
+HEAVY = {"matplotlib", "pinocchio", "scipy", "mcap", "mcap_ros2", "rich", "pyarrow", "distributed", "fsspec"}
 OPENERS = {
     "open",
     "read_text",

@@ -22,23 +22,6 @@ Modrob = Callable[..., Result]
 
 ROOT = Path(__file__).parents[2]
 ARM = ROOT / "assemblies" / "lwa4p-table34-friction.yaml"
-MOTION = """modrob: trajectory/1
-name: short
-kind: waypoints
-order: 5
-points:
-- {t: 0, q: [0, 0, 0, 0, 0, 0]}
-- {t: 2, q: [0.6, 0.5, -0.5, 0.6, 0.5, -0.6]}
-"""
-PUSHED = """modrob: scenario/1
-name: pushed
-seed: 2
-control: {name: feedforward-pd, friction: desired, rate: 500}
-truth: {draw: uniform}
-contacts:
-- {name: push, link: 4, force: [0, 0, -250], start: 0.9, duration: 0.4}
-sensors: {velocity: {noise: 1e-4}, effort: {noise: 0.05}, noise: uniform, effort_kind: current}
-"""
 STATED = (
     "--effort",
     "current",
@@ -53,28 +36,9 @@ STATED = (
 )
 
 
-@pytest.fixture(scope="module")
-def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with motion.yaml, and logs clean.mcap and pushed.mcap."""
-    from typer.testing import CliRunner
-
-    from modrob_cli.cli.app import app
-
-    folder = tmp_path_factory.mktemp("logs")
-    (folder / "motion.yaml").write_text(MOTION, encoding="utf-8")
-    (folder / "pushed.yaml").write_text(PUSHED, encoding="utf-8")
-    clean = "\n".join(line for line in PUSHED.splitlines() if "push, link" not in line and "contacts" not in line)
-    (folder / "clean.yaml").write_text(clean, encoding="utf-8")
-    for name in ("clean", "pushed"):
-        command = ["simulate", str(ARM), str(folder / "motion.yaml"), "--scenario", str(folder / f"{name}.yaml")]
-        result = CliRunner().invoke(app, [*command, "-o", str(folder / f"{name}.mcap")])
-        assert result.exit_code == 0, result.output
-    return folder
-
-
-def test_a_push_is_found_and_a_clean_run_is_not_accused(modrob: Modrob, logs: Path, tmp_path: Path) -> None:
-    both = (logs / "clean.mcap", logs / "pushed.mcap")
-    options = (*STATED, "--filter", "butterworth2:20", "--train", logs / "clean.mcap", "--json", "-o", tmp_path)
+def test_a_push_is_found_and_a_clean_run_is_not_accused(modrob: Modrob, hit_logs: Path, tmp_path: Path) -> None:
+    both = (hit_logs / "clean.mcap", hit_logs / "pushed.mcap")
+    options = (*STATED, "--filter", "butterworth2:20", "--train", hit_logs / "clean.mcap", "--json", "-o", tmp_path)
     result = modrob("collision", ARM, *both, *options)
     assert result.exit_code == 0, result.output
     data = json.loads(result.stdout)
@@ -102,19 +66,19 @@ def test_a_push_is_found_and_a_clean_run_is_not_accused(modrob: Modrob, logs: Pa
     assert "no event" in result.stderr
 
 
-def test_fail_on_collision_is_for_ci(modrob: Modrob, logs: Path, tmp_path: Path) -> None:
-    options = (*STATED, "--fail-on-collision", "--no-compare")
-    assert modrob("collision", ARM, logs / "clean.mcap", *options, "-o", tmp_path / "a").exit_code == 0
-    result = modrob("collision", ARM, logs / "pushed.mcap", *options, "-o", tmp_path / "b")
+def test_fail_on_collision_is_for_ci(modrob: Modrob, hit_logs: Path, tmp_path: Path) -> None:
+    options = (*STATED, "--fail-on-collision", "--no-compare", "--details", "0")
+    assert modrob("collision", ARM, hit_logs / "clean.mcap", *options, "-o", tmp_path / "a").exit_code == 0
+    result = modrob("collision", ARM, hit_logs / "pushed.mcap", *options, "-o", tmp_path / "b")
     assert result.exit_code == 4
     assert "collision: pushed: " in result.stderr
     assert (tmp_path / "b" / "pushed.collision.json").is_file()
 
 
-def test_files_say_the_same(modrob: Modrob, logs: Path, tmp_path: Path) -> None:
+def test_files_say_the_same(modrob: Modrob, hit_logs: Path, tmp_path: Path) -> None:
     """CSV and MCAP hold measurement and band in amperes; the table holds the band; the page is one file."""
     options = (*STATED, "--filter", "first-order:20", "--point", "q4:0,0,0.1", "--json", "-o", tmp_path)
-    result = modrob("collision", ARM, logs / "pushed.mcap", *options)
+    result = modrob("collision", ARM, hit_logs / "pushed.mcap", *options)
     assert result.exit_code == 0, result.output
     data = json.loads(result.stdout)
     with (tmp_path / "pushed.collision.csv").open(newline="", encoding="utf-8") as stream:
@@ -148,8 +112,8 @@ def test_files_say_the_same(modrob: Modrob, logs: Path, tmp_path: Path) -> None:
     assert data["logs"][0]["contact_forces"][1]["point"] == "q4:0,0,0.1"
 
 
-def test_planned_motions_give_thresholds(modrob: Modrob, logs: Path, tmp_path: Path) -> None:
-    result = modrob("collision", ARM, logs / "motion.yaml", "--ddq-tolerance", "0.5", "--json", "-o", tmp_path)
+def test_planned_motions_give_thresholds(modrob: Modrob, hit_logs: Path, tmp_path: Path) -> None:
+    result = modrob("collision", ARM, hit_logs / "motion.yaml", "--ddq-tolerance", "0.5", "--json", "-o", tmp_path)
     assert result.exit_code == 0, result.output
     data = json.loads(result.stdout)
     assert data["collision"] is None
@@ -160,17 +124,21 @@ def test_planned_motions_give_thresholds(modrob: Modrob, logs: Path, tmp_path: P
     assert log["contact_forces"][0]["worst_direction"]["median"] > log["contact_forces"][0]["best_direction"]["median"]
 
 
-def test_accelerations_from_the_measurement_and_from_a_planned_file(modrob: Modrob, logs: Path, tmp_path: Path) -> None:
+def test_accelerations_from_the_measurement_and_from_a_planned_file(
+    modrob: Modrob, hit_logs: Path, tmp_path: Path
+) -> None:
     """Three ways to know the acceleration; none accuses the clean run, all find the push."""
     stated = ("--effort", "current", "--dq-noise", "1e-4", "--effort-noise", "0.05", "--skip", "0.2")
     ways = {
-        "file": ("--desired", logs / "motion.yaml", "--ddq-tolerance", "3"),
+        "file": ("--desired", hit_logs / "motion.yaml", "--ddq-tolerance", "3"),
         "measured": ("--acceleration", "measured", "--jerk", "3000"),
         "smoothed": ("--acceleration", "smoothed", "--cutoff", "20", "--ddq-tolerance", "3"),
     }
     for name, way in ways.items():
-        both = (logs / "clean.mcap", logs / "pushed.mcap")
-        result = modrob("collision", ARM, *both, *stated, *way, "--no-compare", "--json", "-o", tmp_path / name)
+        both = (hit_logs / "clean.mcap", hit_logs / "pushed.mcap")
+        result = modrob(
+            "collision", ARM, *both, *stated, *way, "--no-compare", "--details", "0", "--json", "-o", tmp_path / name
+        )
         assert result.exit_code == 0, result.output
         clean, pushed = json.loads(result.stdout)["logs"]
         assert clean["events"] == [], name
@@ -211,24 +179,24 @@ def without_desired(source: Path, path: Path) -> Path:
     ids=lambda value: " ".join(map(str, value[-2:])) if isinstance(value, tuple) else None,
 )
 def test_what_does_not_fit_is_said(
-    modrob: Modrob, logs: Path, tmp_path: Path, options: tuple[str, ...], code: int, said: str
+    modrob: Modrob, hit_logs: Path, tmp_path: Path, options: tuple[str, ...], code: int, said: str
 ) -> None:
-    result = modrob("collision", ARM, logs / "clean.mcap", *options, "-o", tmp_path / "out")
+    result = modrob("collision", ARM, hit_logs / "clean.mcap", *options, "-o", tmp_path / "out")
     assert result.exit_code == code, result.output
     assert said in result.stderr
     assert not (tmp_path / "out").exists()
 
 
-def test_faults_of_all_logs_at_once_and_nothing_is_overwritten(modrob: Modrob, logs: Path, tmp_path: Path) -> None:
-    bare = without_desired(logs / "clean.mcap", tmp_path / "bare.mcap")
+def test_faults_of_all_logs_at_once_and_nothing_is_overwritten(modrob: Modrob, hit_logs: Path, tmp_path: Path) -> None:
+    bare = without_desired(hit_logs / "clean.mcap", tmp_path / "bare.mcap")
     (tmp_path / "bad.mcap").write_bytes(b"nonsense")
     result = modrob("collision", ARM, bare, tmp_path / "bad.mcap", *STATED, "-o", tmp_path / "out")
     assert result.exit_code == 3
     assert "no topic of a controller" in result.stderr
     assert "bad.mcap" in result.stderr
-    first = modrob("collision", ARM, logs / "clean.mcap", *STATED, "--no-compare", "-o", tmp_path / "out")
+    first = modrob("collision", ARM, hit_logs / "clean.mcap", *STATED, "--no-compare", "-o", tmp_path / "out")
     assert first.exit_code == 0, first.output
-    assert modrob("collision", ARM, logs / "clean.mcap", *STATED, "-o", tmp_path / "out").exit_code == 6
+    assert modrob("collision", ARM, hit_logs / "clean.mcap", *STATED, "-o", tmp_path / "out").exit_code == 6
 
 
 def test_filters_are_read() -> None:

@@ -263,7 +263,7 @@ def test_faults_of_all_logs_and_short_logs(place: Path, tmp_path: Path) -> None:
     both = modrob(
         place / "three.urdf", place / "run0.mcap", log, "--effort", "torque", "-o", tmp_path / "out", "--json"
     )
-    assert both.exit_code == 0
+    assert both.exit_code == 5
     assert json.loads(both.stdout)["skipped"][0]["log"] == str(log)
     missing = modrob(place / "three.urdf", tmp_path / "none.mcap", tmp_path / "nor.mcap", "--effort", "torque")
     assert missing.exit_code == 3

@@ -203,6 +203,31 @@ def test_options_out_of_range(tmp_path: Path) -> None:
     assert modrob("info").exit_code == 2
 
 
+def test_info_of_a_folder_goes_on_after_a_bad_log(tmp_path: Path) -> None:
+    (tmp_path / "runs").mkdir()
+    for name in ("run_10", "run_2"):
+        record(tmp_path / "runs" / f"{name}.mcap")
+    bad = tmp_path / "runs" / "bad.mcap"
+    bad.write_text("nothing")
+    done = modrob("info", tmp_path / "runs", "--json")
+    assert done.exit_code == 3
+    result = json.loads(done.stdout)
+    assert [Path(log["log"]).stem for log in result["logs"]] == ["run_2", "run_10"]
+    reason = f"{bad}: found something else, expected an MCAP file"
+    assert result["skipped"] == [{"log": str(bad), "reason": reason, "code": 3}]
+    assert f"error: {reason}" in done.stderr
+
+
+def test_info_of_a_url_names_the_url(tmp_path: Path) -> None:
+    fsspec = pytest.importorskip("fsspec", reason="fsspec is not installed (extra modrob[dask])")
+    fsspec.filesystem("memory").pipe_file("/info/run.mcap", record(tmp_path / "run.mcap").read_bytes())
+    done = modrob("info", "memory://info/run.mcap", "--json")
+    assert done.exit_code == 0, done.output
+    (log,) = json.loads(done.stdout)["logs"]
+    assert log["log"] == "memory://info/run.mcap"
+    assert log["read"]["samples"] == 100
+
+
 def test_help_shows_examples() -> None:
     for command in ("info", "convert"):
         assert f"Example: modrob log {command}" in " ".join(modrob(command, "--help").stdout.split())

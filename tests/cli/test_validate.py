@@ -182,7 +182,7 @@ def test_data_that_a_file_was_fitted_to_cannot_validate_it(robot: Path, tmp_path
 def test_one_short_log_does_not_stop_the_others(robot: Path, tmp_path: Path) -> None:
     """Long enough to be read, too short to be fitted to its first part and judged on the rest."""
     short, good = record(tmp_path / "short.mcap", samples=100), record(tmp_path / "good.mcap")
-    options = ("--effort", "torque", "--max-nrmse", 0.5, "--json")
+    options = ("--effort", "torque", "--max-nrmse", 0.5, "--json", "--details", 0)
     done = modrob(robot, short, good, *options, "-o", tmp_path / "out")
     assert done.exit_code == 4, done.output
     result = json.loads(done.stdout)
@@ -269,11 +269,15 @@ def test_options_out_of_range_are_usage_errors(robot: Path, tmp_path: Path, opti
     assert not (tmp_path / "out").exists()
 
 
-def test_the_faults_of_all_logs_are_reported_and_nothing_is_written(robot: Path, tmp_path: Path) -> None:
+def test_the_faults_of_all_logs_are_reported_and_the_good_one_is_judged(robot: Path, tmp_path: Path) -> None:
     good, bad = record(tmp_path / "good.mcap"), tmp_path / "bad.mcap"
     bad.write_bytes(good.read_bytes()[:5000])
     logs = (bad, good, tmp_path / "none.mcap")
-    done = modrob(robot, *logs, "--effort", "torque", "-o", tmp_path / "out", "--strict")
+    options = ("--effort", "torque", "--strict", "--details", 0)
+    done = modrob(robot, *logs, *options, "-o", tmp_path / "all")
+    assert done.exit_code == 3
+    assert (tmp_path / "all" / "good.validate.json").exists()
+    done = modrob(robot, bad, tmp_path / "none.mcap", *options, "-o", tmp_path / "out")
     assert done.exit_code == 3
     assert "bad.mcap: --strict refuses a file that is damaged: damaged: the file ends in the middle" in done.stderr
     assert "none.mcap: file not found" in done.stderr
@@ -340,10 +344,11 @@ def test_logs_of_one_name_get_outputs_of_their_own(robot: Path, tmp_path: Path) 
     (tmp_path / "a").mkdir()
     (tmp_path / "b").mkdir()
     logs = (record(tmp_path / "a" / "run.mcap"), record(tmp_path / "b" / "run.mcap", scale=2.0))
-    done = modrob(robot, *logs, "--effort", "torque", "-o", tmp_path / "out", "--json")
+    done = modrob(robot, *logs, "--effort", "torque", "--details", 1, "-o", tmp_path / "out", "--json")
     assert [Path(name).name for name in json.loads(done.stdout)["files"].values()] == [
-        "two.validate.html", "two.validate.junit.xml", "run.validate.json", "run.validate.png", "run.validate.csv",
-        "run-2.validate.json", "run-2.validate.png", "run-2.validate.csv",
+        "two.validate.html", "two.validate.junit.xml", "two.validate.summary.json", "two.validate.logs.csv",
+        "two.validate.logs.parquet", "run.validate.json", "run.validate.csv",
+        "run-2.validate.json", "run-2.validate.csv", "run-2.validate.png", "run-2.validate.html",
     ]  # fmt: skip
     assert json.loads((tmp_path / "out" / "run-2.validate.json").read_text())["logs"][0]["log"] == str(logs[1])
 

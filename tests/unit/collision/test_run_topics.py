@@ -42,7 +42,7 @@ def test_desired_accelerations_and_contacts(tmp_path: Path) -> None:
     assert np.array_equal(found.values[2], desired[:, 4:6])
     (contact,) = topics.contacts
     assert contact.name == "push"
-    assert contact.active.tolist() == [False, True, True, False, False]
+    assert contact.windows == ((int(STAMPS[1]), int(STAMPS[3])),)
     assert topics.labelled
 
 
@@ -55,7 +55,7 @@ def test_the_truth_tells_where_no_contact_has_a_topic(tmp_path: Path) -> None:
     truth[3, 11] = 2.0  # external torque of the second joint
     write_mcap(tmp_path / "pushed.mcap", [joints(), Series("/truth", joint_truth(NAMES), STAMPS, truth)])
     _, topics = read_run(tmp_path / "pushed.mcap", NAMES, LogOptions())
-    assert topics.contacts[0].active.tolist() == [False, False, False, True, False]
+    assert topics.contacts[0].windows == ((int(STAMPS[3]), int(STAMPS[4])),)
 
 
 def test_a_log_without_labels_says_so(tmp_path: Path) -> None:

@@ -1,14 +1,15 @@
 """A small form of the simulated study (``benchmarks/collision_study.py``): no false alarms, and pushes are found."""
 
 from benchmarks.collision_study import ROBOT, judge, simulate_run, study_options
-from modrob_cli.workflows.collision_judge import learn
+from modrob_cli.workflows.collision_banding import learn
+from modrob_cli.workflows.collision_stream import stream_of
 from modrob_cli.workflows.robots import load_robot
 
 
 def test_no_false_alarm_and_strong_pushes_are_found() -> None:
     """Arms and payloads drawn from the box, noise within its stated bounds."""
     robot, options = load_robot(ROBOT).robot, study_options()
-    learned = learn([simulate_run(robot, 10_000, False).run], options)
+    learned = learn([stream_of(simulate_run(robot, 10_000, False).run)], options)
     assert learned is not None
     clean = [simulate_run(robot, seed, False) for seed in range(4)]
     for one in clean:

@@ -5,7 +5,7 @@ import pytest
 
 from modrob_cli.arrays import Array
 from modrob_cli.identify.prediction import prediction_errors
-from modrob_cli.identify.prediction_pooled import pooled_errors
+from modrob_cli.identify.prediction_pooled import PooledError, error_sums, errors_of
 from modrob_cli.identify.run import Run
 from modrob_cli.identify.signals import prepare
 from modrob_cli.model.log import JointLog
@@ -17,6 +17,10 @@ def make_run(name: str, torque: Array) -> Run:
     signals = prepare(log, 5.0)
     small = np.full(1, 1e-3)
     return Run(name, signals, log.effort, np.zeros_like(log.effort), signals.used, small, small, small)
+
+
+def pooled_errors(runs: list[Run], predicted: list[Array]) -> list[PooledError] | None:
+    return errors_of([error_sums([run], torque)[0] for run, torque in zip(runs, predicted, strict=True)])
 
 
 def test_two_runs_count_by_their_samples() -> None:
@@ -40,6 +44,17 @@ def test_one_run_as_alone() -> None:
     (alone,) = prediction_errors(run.signals, run.tau, predicted)
     for key in ("rmse", "nrmse", "nrmse_low_passed", "max_error", "worst_time"):
         assert getattr(found.error, key) == pytest.approx(getattr(alone, key), rel=1e-12)
+
+
+def test_parts_of_a_run_make_up_the_whole() -> None:
+    rng = np.random.default_rng(2)
+    run = make_run("a", rng.normal(size=800))
+    predicted = rng.normal(size=(800, 1))
+    parts = error_sums([run.between(0.0, 3.0), run.between(3.0, np.inf)], predicted)
+    (found,), (whole,) = errors_of(parts) or [], pooled_errors([run], [predicted]) or []
+    assert found.samples == whole.samples
+    for key in ("rmse", "nrmse", "nrmse_low_passed", "max_error", "worst_time"):
+        assert getattr(found.error, key) == pytest.approx(getattr(whole.error, key), rel=1e-12)
 
 
 def test_nothing_to_compare_with() -> None:
