@@ -44,22 +44,21 @@ class ObserverTuner:
     """
 
     def __init__(self) -> None:
-        self._most: list[Array] = [np.zeros(1) for _ in GAINS]
+        self._most = np.zeros(1)
         self.begin()
 
     def begin(self) -> None:
         """Begin a new run."""
-        self._runs = [ObserverRun(gain) for gain in GAINS]
+        self._run = ObserverRun(np.array(GAINS)[:, None])
 
     def add(self, terms: MomentumTerms) -> None:
         """Take the next samples of the run."""
-        for k, run in enumerate(self._runs):
-            self._most[k] = np.maximum(self._most[k], np.abs(run.add(terms)).max(axis=0))
+        self._most = np.maximum(self._most, np.abs(self._run.add(terms)).max(axis=0))
 
     def tuned(self, margin: float) -> TunedObserver:
         """Gain and thresholds by all runs up to now; ``margin`` as for :func:`constant_thresholds`."""
-        found = [(1.0 + margin) * most for most in self._most]
-        steps = np.stack([limit / (1.0 - np.exp(-gain * ANSWER)) for gain, limit in zip(GAINS, found, strict=True)])
+        found = (1.0 + margin) * self._most
+        steps = found / (1.0 - np.exp(-np.array(GAINS) * ANSWER))[:, None]
         least = np.where(steps.min(axis=0) > 0.0, steps.min(axis=0), 1.0)
         best = int((steps / least).mean(axis=1).argmin())
         return TunedObserver(GAINS[best], found[best])

@@ -57,28 +57,28 @@ class ObserverRun:
 
     Parameters
     ----------
-    gain : K > 0, the same for all joints [1/s]
+    gain : K > 0, the same for all joints [1/s]; or several at once, shape (G, 1)
     """
 
-    def __init__(self, gain: float) -> None:
-        self._gain = gain
+    def __init__(self, gain: float | Array) -> None:
+        self._gain = np.asarray(gain, dtype=float)
         self._last: tuple[float, Array, Array, Array] | None = None
 
     def add(self, terms: MomentumTerms) -> Array:
-        """Estimate r of the external torque at the next samples, shape (N, n); it starts at 0."""
+        """Estimate r of the external torque at the next samples, shape (N, n) or (N, G, n); it starts at 0."""
         if self._last is None:
-            self._last = float(terms.t[0]), terms.p[0], terms.drift[0], np.zeros_like(terms.p[0])
+            start = np.zeros(np.broadcast_shapes(self._gain.shape, terms.p[0].shape))
+            self._last = float(terms.t[0]), terms.p[0], terms.drift[0], start
         t, p, drift, before = self._last
         steps = np.diff(terms.t, prepend=t)
-        pushed = np.diff(terms.p, axis=0, prepend=p[None])
-        mean = terms.drift.copy()
-        mean[1:] += terms.drift[:-1]
-        mean[0] += drift
-        pushed -= 0.5 * mean * steps[:, None]
-        r = np.empty_like(terms.p)
+        mean = 0.5 * (terms.drift + np.concatenate([drift[None], terms.drift[:-1]]))
+        pushed = np.diff(terms.p, axis=0, prepend=p[None]) - mean * steps[:, None]
+        r = np.empty((len(steps), *before.shape))
         # r_k (1 + K h / 2) = r_{k-1} (1 - K h / 2) + K (change of p - integral of the drift).
-        for k, half in enumerate(0.5 * self._gain * steps):
-            before = (before * (1.0 - half) + self._gain * pushed[k]) / (1.0 + half)
+        halves = 0.5 * self._gain * steps.reshape(-1, *[1] * self._gain.ndim)
+        decay, grow = (1.0 - halves) / (1.0 + halves), self._gain / (1.0 + halves)
+        for k, push in enumerate(pushed):
+            before = decay[k] * before + grow[k] * push
             r[k] = before
         self._last = float(terms.t[-1]), terms.p[-1], terms.drift[-1], before
         return r

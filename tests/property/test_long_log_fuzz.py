@@ -11,6 +11,7 @@ from modrob_cli.errors import InputFileError, ModrobError
 from modrob_cli.io.log_options import LogOptions
 from modrob_cli.io.long_log import open_long_log
 from modrob_cli.io.mcap_reader import read_joint_log
+from modrob_cli.model.log import JointLog
 from tests.mcap_samples import JOINT_STATE, Form, Topic, cdr_topic, joint_state, write_topics
 from tests.property.test_log_fuzz import damaged
 from tests.unit.io.test_log_kinds import KINDS
@@ -118,14 +119,22 @@ TROUBLES: list[Callable[[Rng, Messages], None]] = [
 ]
 
 
+def read_whole(path: Path, options: LogOptions, names: tuple[str, ...]) -> tuple[JointLog | None, ModrobError | None]:
+    """The log, or why there is none."""
+    try:
+        return read_joint_log(path, names, options=options), None
+    except ModrobError as error:
+        return None, error
+
+
 def compare(path: Path, options: LogOptions, window: int, names: tuple[str, ...] = NAMES) -> bool:
     """Read both ways; True if there is a log, False if there is an error."""
-    try:
-        whole = read_joint_log(path, names, options=options)
-    except ModrobError as error:
-        with pytest.raises(type(error)) as found:
+    whole, problem = read_whole(path, options, names)
+    if whole is None:
+        assert problem is not None
+        with pytest.raises(type(problem)) as found:
             open_long_log(path, names, options, window)
-        assert str(found.value) == str(error)
+        assert str(found.value) == str(problem)
         return False
     with open_long_log(path, names, options, window) as long:
         assert (long.name, long.joint_names, long.count) == (whole.name, whole.joint_names, len(whole.t))
@@ -155,7 +164,7 @@ def test_troubled_logs_of_one_channel(tmp_path: Path, seed: int) -> None:
     path = write_topics(tmp_path / "log.mcap", [topic], Form(chunk_size=int(rng.choice([300, 2000, 20000]))))
     for publisher in (None, 1, 2):
         for time in ("header", "log"):
-            options = LogOptions(time=time, publisher=publisher)  # type: ignore[arg-type]
+            options = LogOptions(time=time, publisher=publisher)
             compare(path, options, int(rng.integers(1, 50)))
 
 
@@ -181,8 +190,8 @@ def test_damaged_logs_of_every_kind(tmp_path: Path, kind: str) -> None:
     rng = np.random.default_rng(5)
     path = tmp_path / "bad.mcap"
     path.write_bytes(raw)
-    read = compare(path, LogOptions(), 4, ("a", "b"))
-    assert read
+    assert compare(path, LogOptions(), 4, ("a", "b"))
+    read = 0
     for _ in range(20):
         path.write_bytes(damaged(raw, rng))
         read += compare(path, LogOptions(time="log"), 4, ("a", "b"))

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from modrob_cli.arrays import Array
+from modrob_cli.collision.acceleration import measured_acceleration
 from modrob_cli.collision.bands import UncertainMotion, torque_band
 from modrob_cli.dynamics.drive_torque import drive_nominal
 from modrob_cli.dynamics.newton_euler import rnea
@@ -126,7 +127,7 @@ def same(one: Any, other: Any, where: str = "$") -> None:
 WAYS: dict[str, dict[str, Any]] = {
     "desired": {"ddq_tolerance": [0.5]},
     "skip and IANEA": {"ddq_tolerance": [0.5], "skip": 1.01, "method": "ianea", "shortest": 0.02},
-    "measured": {"acceleration": "measured", "jerk": [10.0], "jump": [1.0], "still": [0.01], "compare": False},
+    "measured": {"acceleration": "measured", "jerk": [10.0], "jump": [1.0], "still": [0.01]},
     "smoothed": {"acceleration": "smoothed", "ddq_tolerance": [0.5], "skip": 1.0, "cutoff": 12.0, "compare": False},
 }
 
@@ -167,6 +168,28 @@ def test_the_bands_of_stretches_are_those_of_the_motion(made: Made) -> None:
     closest = {joint["joint"]: joint for joint in result["closest"]}[event["joint"]]
     assert closest["share"] > 1.0
     assert event["start"] <= closest["time"] <= event["end"] or closest["time"] < 1.6
+
+
+@pytest.mark.parametrize("long", [False, True])
+def test_reversals_at_the_ends_of_stretches_count(made: Made, tmp_path: Path, long: bool) -> None:
+    """Accelerations and their tolerances against those of all samples at once; velocities change their signs often."""
+    rng = np.random.default_rng(15)
+    N = 600
+    dq = rng.normal(size=(N, 6)) + 3.0 * np.sign(np.sin(np.arange(N) / 9.0))[:, None]
+    stamps = START + np.arange(N, dtype=np.int64) * 4_000_000 + rng.integers(0, 900_000, N)
+    values = np.hstack([made.q[:N], dq, made.tau[:N]])
+    layout = joint_state(made.robot.joint_names)
+    write_mcap(tmp_path / "log.mcap", [Series("/joint_states", layout, stamps, values)])
+    options = CollisionOptions(acceleration="measured", dq_noise=[2e-3], jerk=[40.0], jump=[2.0], still=[0.1])
+    t = (stamps - stamps[0]) / 1e9
+    ddq, tolerance, first = measured_acceleration(t, dq, options.velocity_knowledge(made.robot))
+    assert first == 4
+    with open_run(made.robot, tmp_path / "log.mcap", "log", options, 10, long) as stream:
+        parts = list(stream.stretches())
+    assert len(parts) == 60
+    assert np.allclose(np.concatenate([part.motion.ddq for part in parts]), ddq[4:], rtol=1e-12)
+    assert np.allclose(np.concatenate([part.motion.ddq_rad for part in parts]), tolerance[4:], rtol=1e-12)
+    assert np.array_equal(stream.survey.least_rad, tolerance[4:].min(axis=0))
 
 
 def test_memory_does_not_grow_with_the_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

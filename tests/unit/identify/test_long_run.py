@@ -116,13 +116,15 @@ def whole_of(robot: Robot, long: LongRun) -> tuple[Run, int]:
     """All pieces as one run, and how many pieces there were."""
     runs = [long.run(robot, piece, rigid=True) for piece in long.pieces()]
 
-    def joined(values: list[Array]) -> Array:
-        return np.concatenate(values)
+    def joined(key: str, of_signals: bool = False) -> Array:
+        return np.concatenate([getattr(run.signals if of_signals else run, key) for run in runs])
 
-    parts = {key: joined([getattr(run.signals, key) for run in runs]) for key in ("t", "q", "dq", "ddq", "effort")}
     used = np.concatenate([run.used for run in runs])
-    signals = replace(runs[0].signals, used=used, **parts)
-    tau, tau_rigid = joined([run.tau for run in runs]), joined([run.tau_rigid for run in runs])
+    signals = replace(
+        runs[0].signals, t=joined("t"), q=joined("q"), dq=joined("dq"), ddq=joined("ddq"),
+        effort=joined("effort", of_signals=True), used=used,
+    )  # fmt: skip
+    tau, tau_rigid = joined("tau"), joined("tau_rigid")
     return replace(runs[0], signals=signals, tau=tau, tau_rigid=tau_rigid, used=used), len(runs)
 
 
