@@ -1,7 +1,7 @@
 """What the results about many logs have in common."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -44,13 +44,14 @@ def overall_provenance(inputs: dict[str, str], outcomes: Sequence[Outcome]) -> d
     return {"modrob": __version__, "inputs": {**inputs, **dict(sorted(logs.items()))}}
 
 
-def log_files(outcomes: Sequence[Outcome], command: str, out: Path) -> dict[str, str]:
-    """Paths of the files of each log by name."""
-    names = []
+def log_files(outcomes: Sequence[Outcome], command: str, out: Path, others: Iterable[str] = ()) -> dict[str, str]:
+    """Paths of the files of each log by name, but for ``others``, which are listed elsewhere."""
+    names: list[str] = []
     for outcome in outcomes:
         if outcome.record is not None:
             names += [f"{outcome.job.name}.{command}.json", *outcome.record["provenance"]["outputs"]]
-    return {name: str(out / name) for name in names}
+    left_out = set(others)
+    return {name: str(out / name) for name in names if name not in left_out}
 
 
 def worst_code(skipped: Sequence[dict[str, Any]], otherwise: int = 0) -> int:

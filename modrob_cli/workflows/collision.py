@@ -87,7 +87,9 @@ def collision(
             _write(folder, robot, result, options, common)
     if not (several or result["logs"][0]["page"]):
         del common["report"]
-    files = {kind: str(out / name) for kind, name in common.items()} | log_files(outcomes, task.command, out)
+    files = {kind: str(out / name) for kind, name in common.items()} | log_files(
+        outcomes, task.command, out, common.values()
+    )
     return {**result, "files": files}
 
 

@@ -73,8 +73,8 @@ def validate(
         result = _result(robot, outcomes, inputs, options)
         with run.outputs() as folder:
             _write(folder, robot, result, options, common)
-    files = {kind: str(out / name) for kind, name in common.items()} | log_files(outcomes, task.command, out)
-    return {**result, "files": files}
+    files = {kind: str(out / name) for kind, name in common.items()}
+    return {**result, "files": files | log_files(outcomes, task.command, out, common.values())}
 
 
 def worst_nrmse(record: dict[str, Any]) -> float:
