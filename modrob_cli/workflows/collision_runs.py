@@ -95,6 +95,7 @@ class RunHead:
 def joined(one: CollisionRun, other: CollisionRun) -> CollisionRun:
     """Two stretches, one behind the other, whose half-widths do not change."""
     motion, more = one.motion, other.motion
-    parts = {key: np.concatenate([getattr(motion, key), getattr(more, key)]) for key in ("t", "q", "dq", "ddq")}
+    t, q, dq, ddq = (np.concatenate([getattr(motion, key), getattr(more, key)]) for key in ("t", "q", "dq", "ddq"))
     tau = None if one.tau is None or other.tau is None else np.concatenate([one.tau, other.tau])
-    return replace(one, motion=replace(motion, **parts), tau=tau, used=np.concatenate([one.used, other.used]))
+    used = np.concatenate([one.used, other.used])
+    return replace(one, motion=replace(motion, t=t, q=q, dq=dq, ddq=ddq), tau=tau, used=used)
