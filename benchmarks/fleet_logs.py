@@ -34,11 +34,10 @@ gravity: [0, 0, 0]
 
 SCENARIO = """modrob: scenario/1
 name: fleet
-control: {name: id, rate: 500}
+control: {name: id, rate: 250}
 truth: {draw: uniform}
 sensors:
   noise: uniform
-  rate: 250
   position: {noise: 2e-5}
   velocity: {noise: 5e-4}
   effort: {noise: 0.3}

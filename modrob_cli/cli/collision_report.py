@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
+from modrob_cli.cli.batch_end import end_batch
 from modrob_cli.cli.console import say, table
 
 if TYPE_CHECKING:
@@ -31,23 +32,8 @@ def end(result: dict[str, Any], fail_on_collision: bool) -> None:
     FailedLogsError
         If logs have no result, or some have events and that counts.
     """
-    from modrob_cli.errors import FailedLogsError, NegativeAnswerError
-    from modrob_cli.workflows.batch_result import worst_code
-
-    skipped = result["skipped"]
-    lines = [_reason(entry) for entry in skipped]
-    negative = 0
-    if fail_on_collision and result["collision"]:
-        negative = NegativeAnswerError.exit_code
-        lines += _events(result)
-    code = worst_code(skipped, negative)
-    if code:
-        raise FailedLogsError("\n".join(_first(lines)), code)
-
-
-def _reason(entry: dict[str, Any]) -> str:
-    named = entry["log"] in entry["reason"]
-    return str(entry["reason"]) if named else f"{entry['log']}: {entry['reason']}"
+    negative = fail_on_collision and bool(result["collision"])
+    end_batch(result["skipped"], negative, _events(result) if negative else ())
 
 
 def _events(result: dict[str, Any]) -> list[str]:
@@ -58,10 +44,6 @@ def _events(result: dict[str, Any]) -> list[str]:
             what = f"{event['joint']} {event['side']}, {event['peak']:.3g} {event['unit']} beyond its band"
             lines.append(f"collision: {log['log']}: {event['start']:.4g} .. {event['end']:.4g} s: {what}")
     return lines
-
-
-def _first(lines: list[str]) -> list[str]:
-    return lines[:_SHOWN] + ([f"and {len(lines) - _SHOWN} more"] if len(lines) > _SHOWN else [])
 
 
 def say_log(log: dict[str, Any], options: "CollisionOptions") -> None:

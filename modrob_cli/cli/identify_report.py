@@ -2,15 +2,14 @@
 
 from typing import Any
 
+from modrob_cli.cli.batch_end import end_batch
 from modrob_cli.cli.bounded_report import say_bounds
 from modrob_cli.cli.console import say, table
-from modrob_cli.errors import FailedLogsError, NegativeAnswerError
 
 _MAIN = (("viscous", "viscous"), ("coulomb", "Coulomb"), ("reflected_inertia", "rotor"), ("offset", "offset"))
 _DIRECTIONS = ("coulomb_forward", "coulomb_backward", "viscous_forward", "viscous_backward")
 _MORE = (*_DIRECTIONS, "load", "stribeck", "stribeck_velocity", "transition_width", "drive_gain")
 _MOST_LOGS = 12
-_MOST_REASONS = 8
 
 
 def say_result(result: dict[str, Any]) -> None:
@@ -56,19 +55,10 @@ def end(result: dict[str, Any]) -> None:
     FailedLogsError
         If logs are left out, or ``--max-nrmse`` is exceeded.
     """
-    from modrob_cli.workflows.batch_result import worst_code
-
-    code, lines = 0, []
-    if result["passed"] is False:
-        code = NegativeAnswerError.exit_code
-        limit = result["options"]["max_nrmse"]
-        lines.append(f"the NRMSE of at least one joint is above the {limit:g} of --max-nrmse")
-    lines += [f"{item['log']}: {item['reason']}" for item in result["skipped"][:_MOST_REASONS]]
-    left = len(result["skipped"]) - _MOST_REASONS
-    lines += [f"and {left} more logs that are left out"] if left > 0 else []
-    code = worst_code(result["skipped"], code)
-    if code:
-        raise FailedLogsError("\n".join(lines), code)
+    limit = result["options"]["max_nrmse"]
+    negative = result["passed"] is False
+    against = [f"the NRMSE of at least one joint is above the {limit:g} of --max-nrmse"] if negative else []
+    end_batch(result["skipped"], negative, against)
 
 
 def _verdict(result: dict[str, Any]) -> str:

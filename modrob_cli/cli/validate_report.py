@@ -2,7 +2,7 @@
 
 from typing import Any
 
-_SHOWN = 8
+from modrob_cli.cli.batch_end import end_batch
 
 
 def measure(record: dict[str, Any]) -> tuple[float, str]:
@@ -17,54 +17,29 @@ def measure(record: dict[str, Any]) -> tuple[float, str]:
 
 
 def end(result: dict[str, Any], wanted: bool) -> None:
-    """Exit code and message of a run that has results.
+    """Exit code and message of a run that has results; ``wanted``: a verdict was asked for.
 
     Raises
     ------
     FailedLogsError
         If logs have no result, or some do not pass.
     """
-    from modrob_cli.errors import FailedLogsError, NegativeAnswerError
-    from modrob_cli.workflows.batch_result import worst_code
-
-    negative = 0
-    lines = []
-    if result["passed"] is False:
-        negative, lines = NegativeAnswerError.exit_code, _against(result)
-    elif wanted and result["passed"] is None:
-        negative = NegativeAnswerError.exit_code
-        lines = [
-            "no verdict: all samples are among those that the values were fitted to; give another log, or say "
-            "--accept-fitted"
-        ]
-    elif result["skipped"]:
-        lines = _first(_skipped_lines(result))
-    code = worst_code(result["skipped"], negative)
-    if code:
-        raise FailedLogsError("\n".join(lines), code)
+    if result["passed"] is None and wanted:
+        advice = "give another log, or say --accept-fitted"
+        against = [f"no verdict: all samples are among those that the values were fitted to; {advice}"]
+        end_batch(result["skipped"], True, against)
+    end_batch(result["skipped"], result["passed"] is False, _against(result))
 
 
 def _against(result: dict[str, Any]) -> list[str]:
-    """What does not pass, worst first, at most a few lines."""
+    """What does not pass, worst first."""
     failed = [(log["log"], joint) for log in result["logs"] for joint in log["joints"] if joint["passed"] is False]
     failed.sort(key=lambda pair: pair[1]["nrmse"] or float("inf"), reverse=True)
-    lines = _skipped_lines(result)
+    lines = []
     for log, joint in failed:
         ratio = "no torque recorded" if joint["nrmse"] is None else f"NRMSE {joint['nrmse']:.3f}"
         lines.append(f"{log}: {joint['name']}: {ratio}, {joint['inside']:.1%} inside the bounds")
-    return _first(lines)
-
-
-def _skipped_lines(result: dict[str, Any]) -> list[str]:
-    """Reasons of the logs without a result; each names its log."""
-    return [
-        entry["reason"] if entry["log"] in entry["reason"] else f"{entry['log']}: {entry['reason']}"
-        for entry in result["skipped"]
-    ]
-
-
-def _first(lines: list[str]) -> list[str]:
-    return lines[:_SHOWN] + ([f"and {len(lines) - _SHOWN} more"] if len(lines) > _SHOWN else [])
+    return lines
 
 
 def say_log(log: dict[str, Any]) -> None:
