@@ -32,6 +32,11 @@ def is_own_output(name: str) -> bool:
     return _OWN.search(name) is not None
 
 
+def is_named_like_a_log(path: Path) -> bool:
+    """Whether somebody looking at its name takes it for a log."""
+    return path.name.lower().endswith(LOG_SUFFIX)
+
+
 def wanted_in_folder(name: str) -> bool:
     """Whether a file in a folder is one of its logs: by its ending, neither hidden nor one of modrob's outputs."""
     return name.lower().endswith(LOG_SUFFIX) and not name.startswith(".") and not is_own_output(name)
@@ -41,11 +46,12 @@ def search_folder(folder: Path) -> list[str]:
     """All MCAP files in a folder and below it, in natural order.
 
     Links to folders are followed, each folder is entered once, and a link never leads up to a folder around the one
-    that is searched. A folder that cannot be entered is part of the result: as a log it fails, with its name.
+    that is searched. A folder that cannot be entered is part of the result, as is an empty one that is named like a
+    log: as a log it fails, with its name.
     """
     found: list[tuple[bool, str]] = []
     for path, entries in _folders([folder]):
-        if entries is None:
+        if entries is None or (not entries and is_named_like_a_log(path)):
             found.append((False, str(path)))
         else:
             wanted = (entry for entry in entries if wanted_in_folder(entry.name) and not is_folder(entry))

@@ -79,7 +79,9 @@ def find_trends(when: FleetTime, measures: Sequence[Measure]) -> list[list[Found
             out.append(Found(None, FEW))
         else:
             moving, drifting = next(moves), next(steady)
-            out.append(Found(found, STEADY if drifting else UNSTEADY if moving else NONE))
+            # Where half of the logs do not move at all, there is no slope to speak of.
+            sloping = drifting and found.slope != 0.0
+            out.append(Found(found, STEADY if sloping else UNSTEADY if moving or drifting else NONE))
     left = iter(out)
     return [[next(left) for _ in measure.series] for measure in measures]
 

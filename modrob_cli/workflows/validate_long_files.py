@@ -120,12 +120,14 @@ def write_details(
     head = {"passed": passed([result], []), "friction": friction, "scope": SCOPES[friction]}
     report = validation_page(robot, worst, result, head, dict(page.inputs), options)
     joints, drawn = report.sections
-    over_time = Section("Over the time of the log", tuple(_over_time(robot, result["stretches"], options)))
+    picture, table = _over_time(robot, result["stretches"], options)
+    over_time = Section("Over the time of the log", (picture,))
     drawn = replace(drawn, title=f"Joint by joint: {where}")
-    folder.write(page.name, render(replace(report, sections=(joints, over_time, drawn))))
+    stretches = Section("Stretch by stretch", (table,), folded=True, on_paper=False)
+    folder.write(page.name, render(replace(report, sections=(joints, over_time, drawn, stretches))))
 
 
-def _over_time(robot: Robot, stretches: list[dict[str, Any]], options: ValidateOptions) -> list[Block]:
+def _over_time(robot: Robot, stretches: list[dict[str, Any]], options: ValidateOptions) -> tuple[Block, Block]:
     """NRMSE of each stretch, drawn and as a table."""
     edges = np.array([[stretch["start"], stretch["end"]] for stretch in stretches])
     ratios = [[joint["nrmse"] for joint in stretch["joints"]] for stretch in stretches]
@@ -146,4 +148,4 @@ def _over_time(robot: Robot, stretches: list[dict[str, Any]], options: ValidateO
                 tones[len(rows), 2 + j] = "bad"
         rows.append((*edges[k].tolist(), *ratios[k], min(joint["inside"] for joint in stretches[k]["joints"])))
     header = ("from [s]", "to [s]", *robot.joint_names, "inside, least")
-    return [picture, Table(header, tuple(rows), f"{said}: NRMSE of each joint; the smallest fraction inside.", tones)]
+    return picture, Table(header, tuple(rows), f"{said}: NRMSE of each joint; the smallest fraction inside.", tones)

@@ -252,3 +252,12 @@ def test_many_logs_of_one_name_are_named_in_linear_time() -> None:
     names = job_names([f"{k}/run.mcap" for k in range(100_000)])
     assert names[0] == "run"
     assert names[-1] == "run-100000"
+
+
+def test_an_empty_folder_that_is_named_like_a_log_does_not_vanish(tree: Tree) -> None:
+    tree("runs/a.mcap", "runs/c.mcap/inner.mcap")
+    Path("runs/b.mcap").mkdir()
+    found = ["runs/a.mcap", "runs/b.mcap", "runs/c.mcap/inner.mcap"]
+    assert find_logs(["runs"]) == find_logs(["runs/*"]) == find_logs(["runs/*.mcap"]) == found
+    with pytest.raises(InputFileError, match="found a folder, expected a log"), local_copy("runs/b.mcap"):
+        pass
