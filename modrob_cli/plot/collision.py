@@ -90,12 +90,24 @@ def _draw_joint(axis: Any, picture: CollisionPicture, j: int, points: int) -> No
         axis.plot(*thin(t, picture.measured[:, j], points), color=INK, linewidth=0.7, zorder=4)
     if picture.outside and len(picture.outside[j]):
         axis.plot(*picture.outside[j].T, ".", color=EVENT, markersize=2.2, zorder=5, rasterized=True)
-    for start, end, joint in picture.events:
-        if joint == j:
-            axis.axvspan(start, max(end, start + 2e-3 * (t[-1] - t[0])), color=EVENT, alpha=0.2, zorder=1, linewidth=0)
+    own = [(start, end) for start, end, joint in picture.events if joint == j]
+    for start, end in _visible(own, 2e-3 * float(t[-1] - t[0])):
+        axis.axvspan(start, end, color=EVENT, alpha=0.2, zorder=1, linewidth=0)
     axis.set_title(_plain(picture.names[j]), loc="left", y=1.0, fontsize=9, fontweight="bold", color=INK)
     axis.set_ylabel(f"[{picture.units[j]}]", fontsize=9)
     axis.set_xlim(float(t[0]), float(t[-1]) if len(t) > 1 else float(t[0]) + 1.0)
+
+
+def _visible(events: Sequence[tuple[float, float]], least: float) -> list[tuple[float, float]]:
+    """Spans to draw: each at least ``least`` wide, those that touch as one, so that any number of events fits."""
+    spans: list[tuple[float, float]] = []
+    for start, end in sorted(events):
+        wide = max(end, start + least)
+        if spans and start <= spans[-1][1]:
+            spans[-1] = (spans[-1][0], max(wide, spans[-1][1]))
+        else:
+            spans.append((start, wide))
+    return spans
 
 
 def _band(axis: Any, t: Array, lower: Array, upper: Array, color: str, points: int) -> None:

@@ -15,8 +15,9 @@ from modrob_cli.workflows.collision_judge import JudgedStretch
 from modrob_cli.workflows.collision_options import CollisionOptions
 from modrob_cli.workflows.collision_stream import RunStream
 
-MOST_ROWS = 20_000
-"""Rows of the table of a log: of a longer one every k-th sample and all outside the band; the MCAP file has all."""
+MOST_ROWS, MOST_OUTSIDE = 20_000, 500_000
+"""Rows of the table of a log: of a longer one every k-th sample and, up to a limit, all outside the band; the MCAP file
+has all."""
 TOPICS = {"measured": "/collision/measured", "lower": "/collision/lower", "upper": "/collision/upper"}
 
 
@@ -33,6 +34,7 @@ class SeriesFiles:
         self._kinds = list(TOPICS) if stream.about.tau is not None else ["lower", "upper"]
         self._factors = effort_factors(robot, options.effort)
         self._layout = joint_state(robot.joint_names, position=False, velocity=False)
+        self._outside = 0
         self._step = -(-stream.survey.samples // MOST_ROWS)
         header = ["t", "used", *(f"{name}.{kind}" for name in robot.joint_names for kind in self._kinds)]
         self._table = NumberCsv(table, header)
@@ -62,6 +64,9 @@ class SeriesFiles:
             [Series(TOPICS[kind], self._layout, stamps, part) for kind, part in zip(self._kinds, values, strict=True)]
         )
         keep = (judged.first + np.arange(len(stamps))) % self._step == 0
-        keep |= (judged.excess != 0.0).any(axis=1)
+        outside = (judged.excess != 0.0).any(axis=1)
+        if self._outside <= MOST_OUTSIDE:
+            keep |= outside
+        self._outside += int(np.count_nonzero(outside))
         series = np.stack([part[keep] for part in values], axis=-1)
         self._table.write(np.column_stack([run.motion.t[keep], run.used[keep], series.reshape(len(series), -1)]))

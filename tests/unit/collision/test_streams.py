@@ -1,5 +1,6 @@
 """Logs judged stretch by stretch through temporary files: the same as read and judged whole, in bounded memory."""
 
+import itertools
 import tracemalloc
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,6 +22,7 @@ from modrob_cli.io.mcap_writer import McapWriter, Series, write_mcap
 from modrob_cli.io.ros_messages import controller_state, joint_state, wrench_stamped
 from modrob_cli.io.run_topics import PushTimes, TopicSeries
 from modrob_cli.model.robot import Robot
+from modrob_cli.plot.collision import _visible
 from modrob_cli.workflows.collision_banding import learn
 from modrob_cli.workflows.collision_judge import JudgedStretch, judge_stream
 from modrob_cli.workflows.collision_load import open_run
@@ -310,3 +312,22 @@ def test_what_a_log_lacks_is_said(made: Made, tmp_path: Path, long: bool, more: 
         open_run(made.robot, tmp_path / "bare.mcap", "bare", options, 200, long),
     ):
         pass
+
+
+def test_any_number_of_events_is_drawn_in_spans_that_cover_them() -> None:
+    """Against a mark for each: what is covered is the same, and the spans stay apart and few."""
+    rng = np.random.default_rng(5)
+    starts = rng.uniform(0.0, 100.0, 3000)
+    events = list(zip(starts.tolist(), (starts + rng.exponential(0.02, 3000)).tolist(), strict=True))
+    least = 0.2
+    spans = _visible(events, least)
+    assert len(spans) <= 100.0 / least
+    assert all(one[1] < other[0] for one, other in itertools.pairwise(spans))
+    grid = np.linspace(-1.0, 102.0, 20_000)
+    marked = np.zeros(len(grid), dtype=bool)
+    for start, end in events:
+        marked |= (grid >= start) & (grid <= max(end, start + least))
+    covered = np.zeros(len(grid), dtype=bool)
+    for start, end in spans:
+        covered |= (grid >= start) & (grid <= end)
+    assert np.array_equal(marked, covered)
