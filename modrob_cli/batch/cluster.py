@@ -103,8 +103,9 @@ def _check_versions(client: Any, address: str) -> None:
         raise UsageError(f"--dask {address}: the scheduler has no workers; start some with: dask worker {address}")
     try:
         found = client.run(installed_version)
-    except ModuleNotFoundError as error:
-        raise UsageError(f"--dask {address}: modrob is not installed on the workers ({error})") from error
+    except Exception as error:  # what a worker cannot load comes as an error of any kind
+        message = f"modrob cannot be used on the workers ({error}); install modrob {__version__} there"
+        raise UsageError(f"--dask {address}: {message}") from error
     other = {worker: version for worker, version in found.items() if version != __version__}
     if other:
         worker, version = next(iter(other.items()))

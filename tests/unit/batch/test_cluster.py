@@ -79,3 +79,17 @@ def test_no_scheduler_is_an_error_that_names_the_fix(tmp_path: Path, monkeypatch
     monkeypatch.setattr("modrob_cli.batch.cluster.PATIENCE", 1)
     with pytest.raises(UsageError, match="found no scheduler there"):
         run_all(texts(tmp_path / "in", "a"), tmp_path / "out", BatchOptions(dask="tcp://127.0.0.1:9"))
+
+
+def test_workers_without_modrob_are_named(
+    cluster: "LocalCluster", tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails() -> str:
+        raise ModuleNotFoundError("No module named 'modrob_cli'")
+
+    monkeypatch.setattr("modrob_cli.batch.cluster.installed_version", fails)
+    with pytest.raises(UsageError, match=r"cannot be used on the workers \(No module named 'modrob_cli'\)"):
+        run_all(texts(tmp_path / "in", "a"), tmp_path / "out", BatchOptions(dask=cluster.scheduler_address))
+    monkeypatch.setattr("modrob_cli.batch.cluster.installed_version", lambda: "0.0.1")
+    with pytest.raises(UsageError, match=r"has modrob 0\.0\.1, here it is"):
+        run_all(texts(tmp_path / "in", "a"), tmp_path / "out", BatchOptions(dask=cluster.scheduler_address))
