@@ -1,7 +1,7 @@
 """What the results about many logs have in common."""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +42,18 @@ def overall_provenance(inputs: dict[str, str], outcomes: Sequence[Outcome]) -> d
         name = outcome.job.file
         logs[name if names[name] == 1 else outcome.job.label] = outcome.done["provenance"]["log"]
     return {"modrob": __version__, "inputs": {**inputs, **dict(sorted(logs.items()))}}
+
+
+def all_files(common: Mapping[str, str], outcomes: Sequence[Outcome], command: str, out: Path) -> dict[str, str]:
+    """Paths of all outputs by kind or name: those about all logs, then those of each.
+
+    Parameters
+    ----------
+    common : names by kind; ``report`` is the page of the log itself where there is only one, if it has one
+    """
+    drawn = len(outcomes) > 1 or bool(outcomes[0].done["logs"][0]["page"])
+    files = {kind: str(out / name) for kind, name in common.items() if kind != "report" or drawn}
+    return files | log_files(outcomes, command, out, common.values())
 
 
 def log_files(outcomes: Sequence[Outcome], command: str, out: Path, others: Iterable[str] = ()) -> dict[str, str]:

@@ -16,7 +16,7 @@ from modrob_cli.io.table_writer import csv_table, parquet_table
 from modrob_cli.io.yaml_writer import yaml_text
 from modrob_cli.model.robot import Robot
 from modrob_cli.report.render import render
-from modrob_cli.workflows.batch_result import input_hashes, jobs_of, log_files, overall_provenance, skipped_entries
+from modrob_cli.workflows.batch_result import all_files, input_hashes, jobs_of, overall_provenance, skipped_entries
 from modrob_cli.workflows.collision_banding import learn
 from modrob_cli.workflows.collision_fleet import collision_fleet_report, collision_table, nearness
 from modrob_cli.workflows.collision_load import open_run
@@ -85,12 +85,7 @@ def collision(
         result = _result(task, outcomes)
         with run.outputs() as folder:
             _write(folder, robot, result, options, common)
-    if not (several or result["logs"][0]["page"]):
-        del common["report"]
-    files = {kind: str(out / name) for kind, name in common.items()} | log_files(
-        outcomes, task.command, out, common.values()
-    )
-    return {**result, "files": files}
+    return {**result, "files": all_files(common, outcomes, task.command, out)}
 
 
 def _training(robot: Robot, options: CollisionOptions) -> Iterator[RunStream]:

@@ -13,9 +13,9 @@ from modrob_cli.io.table_writer import csv_table, parquet_table
 from modrob_cli.model.robot import Robot
 from modrob_cli.report.render import render
 from modrob_cli.workflows.batch_result import (
+    all_files,
     input_hashes,
     jobs_of,
-    log_files,
     overall_provenance,
     skipped_entries,
 )
@@ -73,8 +73,7 @@ def validate(
         result = _result(robot, outcomes, inputs, options)
         with run.outputs() as folder:
             _write(folder, robot, result, options, common)
-    files = {kind: str(out / name) for kind, name in common.items()}
-    return {**result, "files": files | log_files(outcomes, task.command, out, common.values())}
+    return {**result, "files": all_files(common, outcomes, task.command, out)}
 
 
 def worst_nrmse(record: dict[str, Any]) -> float:

@@ -66,14 +66,16 @@ def record(
     return write_mcap(path, {"/joint_states": rows})
 
 
-def modrob(*arguments: object) -> Result:
-    return CliRunner().invoke(app, ["validate", *(str(argument) for argument in arguments)])
+def modrob(*arguments: object, drawn: bool = False) -> Result:
+    """Run the command; picture and page, which are slow, only if they are wanted."""
+    extra = [] if drawn or "--details" in arguments else ["--details", "0"]
+    return CliRunner().invoke(app, ["validate", *(str(argument) for argument in arguments), *extra])
 
 
 def test_known_terms_come_out_and_files_are_written(robot: Path, tmp_path: Path) -> None:
     """A URDF without friction: fitted to the first part of the log, judged on the rest."""
     out = tmp_path / "out"
-    done = modrob(robot, record(tmp_path / "run.mcap"), "--effort", "torque", "-o", out, "--json")
+    done = modrob(robot, record(tmp_path / "run.mcap"), "--effort", "torque", "-o", out, "--json", drawn=True)
     assert done.exit_code == 0, done.output
     result = json.loads(done.stdout)
     assert (result["passed"], result["friction"]) == (None, "held-out")
@@ -219,10 +221,19 @@ def test_verdict_decides_the_exit_code_after_the_files_are_written(robot: Path, 
     log = record(tmp_path / "run.mcap", noise=0.5)
     good = modrob(robot, log, "--effort", "torque", "--max-nrmse", 0.5, "-o", tmp_path / "good", "--json")
     assert (good.exit_code, json.loads(good.stdout)["passed"]) == (0, True)
-    bad = modrob(robot, log, "--effort", "torque", "--max-nrmse", 0.001, "-o", tmp_path / "bad", "--json")
+    options = ("--effort", "torque", "--max-nrmse", 0.001, "-o", tmp_path / "bad", "--json")
+    bad = modrob(robot, log, *options, drawn=True)
     assert (bad.exit_code, json.loads(bad.stdout)["passed"]) == (4, False)
     assert (tmp_path / "bad" / "run.validate.png").exists()
     assert "run.mcap: shoulder: NRMSE" in bad.stderr
+
+
+def test_without_details_there_is_no_page_and_none_is_listed(robot: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    done = modrob(robot, record(tmp_path / "run.mcap"), "--effort", "torque", "--details", 0, "-o", out, "--json")
+    listed = {Path(path).name for path in json.loads(done.stdout)["files"].values()}
+    assert listed == {path.name for path in out.iterdir()}
+    assert listed == {"two.validate.junit.xml", "run.validate.json", "run.validate.csv"}
 
 
 def test_robot_document_with_drive_constants(robot: Path, tmp_path: Path) -> None:
