@@ -34,8 +34,8 @@ def settle_all(
     return [drawn.get(outcome.job, outcome) for outcome in outcomes]
 
 
-def failures_as_error(outcomes: Sequence[Outcome], code: int | None = None) -> FailedLogsError:
-    """Reasons of all failures; ``code`` is what the run would end with without them, None for 0."""
+def failures_as_error(outcomes: Sequence[Outcome]) -> FailedLogsError:
+    """Reasons of all failures, of which there is one at least."""
     failures = [outcome.failure for outcome in outcomes if outcome.failure is not None]
-    codes = [failure.code for failure in failures] + ([] if code is None else [code])
-    return FailedLogsError("\n".join(failure.reason for failure in failures), min(codes))
+    code = min(failure.code for failure in failures)
+    return FailedLogsError("\n".join(failure.reason for failure in failures), code)

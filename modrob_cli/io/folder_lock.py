@@ -37,13 +37,19 @@ class FolderLock:
                 raise OutputError(f"cannot write into {self.path.parent}: {error.strerror}") from error
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
+            except BlockingIOError:
                 other = os.read(handle, _LONGEST).decode(errors="replace").strip()
                 os.close(handle)
                 raise UsageError(
                     f"{self.path.parent} is in use by another run ({other or 'which is just starting'}); wait until it "
                     "has ended, or choose another folder with --out"
                 ) from None
+            except OSError as error:  # a file system without locks
+                os.close(handle)
+                message = (
+                    f"cannot lock {self.path}: {error.strerror}; choose a folder on another file system with --out"
+                )
+                raise OutputError(message) from error
             if self._is_current(handle):
                 break
             os.close(handle)  # the run before removed it between our two steps

@@ -1,6 +1,6 @@
 """``modrob collision`` for one log: its numbers, table, MCAP, picture and page."""
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -41,8 +41,13 @@ class CollisionTask:
     def key(self) -> TaskKey:
         """Robot, planned motion, training runs and options."""
         reading = self.options.reading
-        more = {"reading": [dict(reading.joint_map), reading.time, reading.strict, reading.publisher]}
-        return TaskKey(self.inputs, {**self.options.data, **more, "compare": self.options.compare, "page": self.page})
+        more = {
+            "reading": [dict(reading.joint_map), reading.time, reading.strict, reading.publisher],
+            "filter": astuple(self.options.filter),  # its text has fewer digits
+            "compare": self.options.compare,
+            "page": self.page,
+        }
+        return TaskKey(self.inputs, {**self.options.data, **more})
 
     def run(self, job: LogJob, path: Path, folder: OutputFolder, detailed: bool) -> dict[str, Any]:
         """Judge it.

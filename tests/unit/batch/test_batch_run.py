@@ -45,12 +45,13 @@ def test_each_log_has_its_files_and_a_failure_stays_alone(tmp_path: Path, proces
     names = {f"log{k}.upper.{kind}" for k in (0, 2, 5) for kind in ("txt", "json", "page.txt")}
     assert set(contents(tmp_path / "out")) == names
     assert (tmp_path / "out" / "log0.upper.txt").read_text() == "AA"
-    assert failures_as_error(found, 4).exit_code == 1
+    assert failures_as_error(found).exit_code == 1
 
 
 def test_a_process_that_dies_takes_one_log_with_it(tmp_path: Path) -> None:
     jobs = texts(tmp_path / "in", *["a"] * 3, "die", *["b"] * 4)
     found = run_all(jobs, tmp_path / "out", BatchOptions(2))
+    assert [outcome.job for outcome in found] == jobs
     failed = [outcome for outcome in found if outcome.failure is not None]
     assert [outcome.job.name for outcome in failed] == ["log3"]
     assert failed[0].failure is not None
@@ -118,6 +119,8 @@ def test_only_the_worst_logs_are_drawn(tmp_path: Path) -> None:
     assert [outcome.done["provenance"]["detailed"] for outcome in found] == [False, True, False, True]
     again = run_all(jobs, tmp_path / "out", BatchOptions(1, resume=True, details=2))
     assert all(outcome.kept for outcome in again)
+    run_all(jobs, tmp_path / "out", BatchOptions(1, resume=True, details=3))
+    assert (tmp_path / "out" / "log2.upper.page.txt").exists(), "what was only judged before is drawn now"
 
 
 def test_fail_fast_stops_at_the_first(tmp_path: Path) -> None:
@@ -152,5 +155,7 @@ def test_what_a_killed_run_left_is_removed(tmp_path: Path) -> None:
     staging = tmp_path / "out" / ".modrob-upper"
     staging.mkdir(parents=True)
     (staging / ".modrob-xyz.json").write_text("half")
-    run_all(jobs, tmp_path / "out")
+    with BatchRun(UpperCase(), tmp_path / "out", ONE) as run:
+        assert list(staging.iterdir()) == [], "a full disk gets its room back before the work"
+        run.settle(jobs, False)
     assert not staging.exists()
